@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# All checks of the project: style, types, import rules, unit tests, and a landing with the real
+# processes over DDS and MAVLink. Sets itself up; works on a fresh machine.
+#
+#   launch_scripts/test.sh               everything but the training tests
+#   launch_scripts/test.sh --training    these too (installs torch)
+#   launch_scripts/test.sh --quick       without the landing
+#   anything else is handed to pytest
+set -euo pipefail
+# shellcheck source=launch_scripts/environment.sh
+source "$(dirname "${BASH_SOURCE[0]}")/environment.sh"
+
+extras=wheels,test
+pytest_arguments=()
+for argument in "$@"; do
+    case $argument in
+    --training) extras=wheels,test,train ;;
+    --quick) pytest_arguments+=(-m 'not integration') ;;
+    -h | --help)
+        sed -n '5,12s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+        exit 0
+        ;;
+    *) pytest_arguments+=("$argument") ;;
+    esac
+done
+
+prepare_environment "$extras"
+cd "$checkout"
+
+echo '== style'
+ruff check .
+ruff format --check .
+echo '== types'
+mypy
+echo '== import rules'
+lint-imports --no-cache
+echo '== tests'
+exec python -m pytest "${pytest_arguments[@]}"

@@ -1,0 +1,83 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where the vehicle is, what the autopilot says, where to go: Pose, Telemetry, Site, Setpoint.
+
+The local frame is NED: metres north, east and down of the autopilot's local origin.
+Quaternions are (w, x, y, z) and rotate body FRD vectors into local NED.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Position and attitude at one moment."""
+
+    stamp_ns: int
+    north_m: float
+    east_m: float
+    down_m: float
+    """Down of the local origin: negative in the air."""
+    quaternion_ned_frd: tuple[float, float, float, float]
+    altitude_agl_m: float
+    """Above the ground under the vehicle."""
+
+
+@dataclass(frozen=True)
+class Telemetry:
+    """What the autopilot last said; a field it has not said yet is None."""
+
+    received_ns: int
+    """Steady clock, when the newest of the parts arrived."""
+    pose: Pose | None = None
+    v_north_m_s: float = 0.0
+    v_east_m_s: float = 0.0
+    v_down_m_s: float = 0.0
+    armed: bool = False
+    in_control: bool = False
+    """The autopilot is in the mode in which it obeys our set-points (GUIDED, OFFBOARD)."""
+    mode: str = ''
+    """The autopilot's own name of its mode."""
+    landed: bool | None = None
+    status_text: str = ''
+    """The newest STATUSTEXT."""
+
+
+@dataclass(frozen=True)
+class Site:
+    """A place on the ground to land on."""
+
+    north_m: float
+    east_m: float
+    clearance_m: float
+    """Distance from its centre to the nearest ground that is not known to be safe."""
+    area_m2: float
+    """Area of the connected safe ground around it."""
+    confidence: float
+    """Mean safety score inside the clearance circle, 0 to 1."""
+    age_s: float
+    """Age of the newest look at its centre."""
+
+    def distance_m(self, pose: Pose) -> float:
+        """Horizontal distance from the point below the vehicle."""
+        return hypot(self.north_m - pose.north_m, self.east_m - pose.east_m)
+
+
+@dataclass(frozen=True)
+class Setpoint:
+    """A velocity command in the local frame; heading is held."""
+
+    stamp_ns: int
+    """Stamp of the frame that it rests on (0 when it rests on none)."""
+    v_north_m_s: float = 0.0
+    v_east_m_s: float = 0.0
+    v_down_m_s: float = 0.0
+    """Positive descends."""
+
+    @property
+    def is_zero(self) -> bool:
+        """All three components are exactly zero."""
+        return self.v_north_m_s == 0.0 and self.v_east_m_s == 0.0 and self.v_down_m_s == 0.0

@@ -1,0 +1,49 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""ament_python package: the same files serve `pip install .` and `colcon build`."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = 'peace_ros'
+ROOT = Path(__file__).resolve().parent
+
+# What nodes need at run time lies inside the installed package too, because `pip` knows no ament
+# index: models/ and config/ become package data of two sub-packages.
+SHIPPED = ('config', 'models')
+
+NODES = ('prompt_generator', 'segmentation', 'landing', 'satellite_view', 'autopilot_sim')
+
+
+def _share(folder: str) -> list[tuple[str, list[str]]]:
+    """List a folder's files for the share directory of the ament index."""
+    files_of: dict[str, list[str]] = {}
+    for path in sorted((ROOT / folder).rglob('*')):
+        if path.is_file() and '__pycache__' not in path.parts:
+            relative = path.relative_to(ROOT)
+            files_of.setdefault(f'share/{NAME}/{relative.parent}', []).append(str(relative))
+    return sorted(files_of.items())
+
+
+setup(
+    name=NAME,
+    packages=[
+        *find_packages(include=[NAME, f'{NAME}.*']),
+        *(f'{NAME}.{folder}' for folder in SHIPPED),
+    ],
+    package_dir={f'{NAME}.{folder}': folder for folder in SHIPPED},
+    package_data={f'{NAME}.{folder}': ['**/*'] for folder in SHIPPED},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'config/ament/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+        (f'share/{NAME}/launch', ['launch_scripts/landing.launch.py']),
+        *_share('config'),
+    ],
+    entry_points={
+        'console_scripts': [
+            'peace = peace_ros.cli:main',
+            *(f'{node} = peace_ros.nodes.{node}:main' for node in NODES),
+        ],
+    },
+)
