@@ -9,9 +9,13 @@ from setuptools import find_packages, setup
 NAME = 'peace_ros'
 ROOT = Path(__file__).resolve().parent
 
+# Tells the ament index that the package is installed; its content means nothing.
+MARKER = Path('config/ament') / NAME
+
 # What nodes need at run time lies inside the installed package too, because `pip` knows no ament
-# index: models/ and config/ become package data of two sub-packages.
-SHIPPED = ('config', 'models')
+# index: models/ and config/ become package data of two sub-packages. (A symlink install runs this
+# file from a build folder without them and finds them in the checkout instead.)
+SHIPPED = [folder for folder in ('config', 'models') if Path(__file__).with_name(folder).is_dir()]
 
 NODES = ('prompt_generator', 'segmentation', 'landing', 'satellite_view', 'autopilot_sim')
 
@@ -20,8 +24,8 @@ def _share(folder: str) -> list[tuple[str, list[str]]]:
     """List a folder's files for the share directory of the ament index."""
     files_of: dict[str, list[str]] = {}
     for path in sorted((ROOT / folder).rglob('*')):
-        if path.is_file() and '__pycache__' not in path.parts:
-            relative = path.relative_to(ROOT)
+        relative = path.relative_to(ROOT)
+        if path.is_file() and relative != MARKER:
             files_of.setdefault(f'share/{NAME}/{relative.parent}', []).append(str(relative))
     return sorted(files_of.items())
 
@@ -35,7 +39,7 @@ setup(
     package_dir={f'{NAME}.{folder}': folder for folder in SHIPPED},
     package_data={f'{NAME}.{folder}': ['**/*'] for folder in SHIPPED},
     data_files=[
-        ('share/ament_index/resource_index/packages', [f'config/ament/{NAME}']),
+        ('share/ament_index/resource_index/packages', [str(MARKER)]),
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/launch', ['launch_scripts/landing.launch.py']),
         *_share('config'),
