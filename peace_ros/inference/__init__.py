@@ -1,0 +1,33 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Model bundles and the networks in them, run by ONNX Runtime."""
+
+from peace_ros.inference.bundle import Bundle, FileEntry, InputSpec, Manifest
+from peace_ros.inference.clip import ClipEncoder
+from peace_ros.inference.preprocess import Preprocessor
+from peace_ros.inference.session import (
+    DEFAULT_PROVIDERS,
+    Session,
+    check_providers,
+    open_sessions,
+)
+from peace_ros.inference.text_cache import TextCache
+from peace_ros.inference.text_encoder import TextEncoder
+from peace_ros.inference.tokenizer import Tokenizer, Tokens
+
+__all__ = [
+    'DEFAULT_PROVIDERS',
+    'Bundle',
+    'ClipEncoder',
+    'FileEntry',
+    'InputSpec',
+    'Manifest',
+    'Preprocessor',
+    'Session',
+    'TextCache',
+    'TextEncoder',
+    'Tokenizer',
+    'Tokens',
+    'check_providers',
+    'open_sessions',
+]

@@ -1,0 +1,102 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Model bundles: a folder with manifest.json, ONNX files and tokenizer.json, checked on load."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from peace_ros.domain import BundleError
+from peace_ros.inference.manifest import FileEntry, InputSpec, Manifest, parse_manifest
+from peace_ros.resources import models_dir
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = ['MANIFEST_NAME', 'Bundle', 'FileEntry', 'InputSpec', 'Manifest']
+
+MANIFEST_NAME = 'manifest.json'
+_CHUNK_BYTES = 1 << 20
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A model bundle whose files were all there, whole and unchanged when it was loaded."""
+
+    folder: Path
+    manifest: Manifest
+    checksum: str
+    """SHA-256 (hex) of the manifest, which holds that of every file: one name for all of it."""
+    paths: Mapping[str, Path]
+    """Role -> file."""
+
+    @classmethod
+    def load(cls, path_or_name: Path | str) -> Bundle:
+        """Load from a folder, or by name from the bundles that ship with the package.
+
+        Raises BundleError that names the file, what is wrong with it and what to do. The graphs
+        are held against their family's tensors when a session opens them.
+        """
+        folder = _find(path_or_name)
+        manifest_path = folder / MANIFEST_NAME
+        try:
+            raw = manifest_path.read_bytes()
+        except OSError as error:
+            raise BundleError(
+                f'{manifest_path}: {error.strerror}; a bundle is a folder with a {MANIFEST_NAME}'
+            ) from error
+        manifest = parse_manifest(raw, str(manifest_path))
+        for name, entry in manifest.files.items():
+            _check_file(folder / name, entry)
+        paths = {role: folder / name for role, name in manifest.roles.items()}
+        return cls(folder, manifest, hashlib.sha256(raw).hexdigest(), MappingProxyType(paths))
+
+    def require_family(self, family: str) -> None:
+        """Raise BundleError unless the bundle is of this family."""
+        if self.manifest.family != family:
+            raise BundleError(
+                f'{self.folder / MANIFEST_NAME}: family is {self.manifest.family!r} where '
+                f'{family!r} is needed; choose another bundle'
+            )
+
+
+def _find(path_or_name: Path | str) -> Path:
+    folder = Path(path_or_name).expanduser()
+    if folder.is_dir():
+        return folder
+    shipped = models_dir()
+    name = str(path_or_name)
+    if name and Path(name).name == name and (shipped / name).is_dir():
+        return shipped / name
+    names = sorted(each.parent.name for each in shipped.glob(f'*/{MANIFEST_NAME}'))
+    raise BundleError(
+        f'no model bundle {name!r}: give a folder with a {MANIFEST_NAME} or the name of a '
+        f'shipped bundle ({", ".join(names) or "none"} in {shipped})'
+    )
+
+
+def _check_file(path: Path, entry: FileEntry) -> None:
+    try:
+        size = path.stat().st_size
+        if size != entry.bytes:
+            raise BundleError(
+                f'{path}: {size} bytes where the manifest says {entry.bytes}; '
+                'fetch or build the bundle again'
+            )
+        digest = hashlib.sha256()
+        with path.open('rb') as file:
+            while chunk := file.read(_CHUNK_BYTES):
+                digest.update(chunk)
+    except OSError as error:
+        raise BundleError(
+            f'{path}: {error.strerror}, yet the manifest lists it; fetch or build the bundle again'
+        ) from error
+    if digest.hexdigest() != entry.sha256:
+        raise BundleError(
+            f'{path}: SHA-256 {digest.hexdigest()} where the manifest says {entry.sha256}; '
+            'the file was changed or damaged, fetch or build the bundle again'
+        )

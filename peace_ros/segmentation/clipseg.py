@@ -1,0 +1,145 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""CLIPSeg: the image is encoded once per frame and decoded once for all terms together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from peace_ros.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
+from peace_ros.inference import Bundle, Preprocessor, TextEncoder, open_sessions
+from peace_ros.inference.contract import IS_POSITIVE, PIXEL_VALUES, TERM_LOGITS, TEXT_EMBEDDING
+from peace_ros.segmentation.fusion import FUSIONS
+from peace_ros.segmentation.segmenter import SegmentationParameters
+from peace_ros.segmentation.terms import Terms
+
+_ROUNDING = 1e-3
+"""How far beyond 0 and 1 a score may lie, from arithmetic in fp16 or int8."""
+
+
+class ClipSegSegmenter:
+    """A Segmenter over a bundle of the family ``clipseg``."""
+
+    def __init__(self, bundle: Bundle, terms: Terms, parameters: SegmentationParameters) -> None:
+        """Open the bundle's graphs and run them once.
+
+        Args:
+            bundle: of the family ``clipseg``.
+            terms: what to look for.
+            parameters: of the segmentation; its bundle and terms are those given here.
+
+        Raises:
+            BundleError: the bundle is of another family or its graphs do not fit it.
+            ConfigurationError: an execution provider is not available, or softmax is asked for
+                without a negative term.
+        """
+        if parameters.fusion == 'softmax' and not terms.negative:
+            raise ConfigurationError(
+                'fusion softmax without negative terms would call everything safe: '
+                'name negative terms or choose set_difference'
+            )
+        bundle.require_family('clipseg')
+        self._terms = terms
+        self._fusion = FUSIONS[parameters.fusion]
+        self._sessions = open_sessions(
+            bundle,
+            ('image_encoder', 'text_encoder', 'decoder'),
+            threads=parameters.threads,
+            providers=parameters.providers,
+        )
+        cache_dir = Path(parameters.cache_dir).expanduser() if parameters.cache_dir else None
+        self._text = TextEncoder(bundle, self._sessions['text_encoder'], cache_dir)
+        self._preprocess = Preprocessor(bundle.manifest.input)
+        self._features = [each.name for each in self._sessions['image_encoder'].graph.outputs]
+        self._is_positive = np.array(
+            [1.0] * len(terms.positive) + [0.0] * len(terms.negative), np.float32
+        )
+        self._warm_up(bundle)
+
+    def _warm_up(self, bundle: Bundle) -> None:
+        size = bundle.manifest.input
+        blank = np.zeros((size.height, size.width, 3), np.uint8)
+        encoder = self._sessions['image_encoder']
+        features = encoder.warm_up(self._features, {PIXEL_VALUES: self._preprocess(blank)})
+        texts = np.zeros((len(self._terms), bundle.manifest.embedding_width), np.float32)
+        self._sessions['decoder'].warm_up(self._fusion.outputs, self._feeds(features, texts))
+
+    @property
+    def terms(self) -> Terms:
+        """What it looks for."""
+        return self._terms
+
+    @property
+    def unknown_terms(self) -> Mapping[str, tuple[str, ...]]:
+        """Term -> its words that the model has never learned; it cannot see those."""
+        return self._text.unknown_words(self._terms.all)
+
+    @property
+    def calls(self) -> Mapping[str, int]:
+        """Role of a network -> how often it ran, without warm-ups."""
+        return {role: session.calls for role, session in self._sessions.items()}
+
+    def prepare(self, prompt: Prompt) -> None:
+        """Embed the prompt's texts ahead of the frame; may be called from another thread."""
+        self._embeddings(prompt)
+
+    def segment(self, frame: Frame, prompt: Prompt) -> Heatmap:
+        """Return the safety of each pixel at network resolution, with the frame's stamp.
+
+        Raises ImageError for an image that cannot be used, BundleError for an answer of the
+        network that cannot be used.
+        """
+        maps = self._decode(frame, prompt, self._fusion.outputs)
+        safety = self._fusion.combine(*(self._checked(each) for each in maps))
+        return Heatmap(safety, frame.stamp_ns)
+
+    def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
+        """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``."""
+        (logits,) = self._decode(frame, prompt, [TERM_LOGITS])
+        if logits.ndim != 3 or logits.shape[0] != len(self._terms):
+            raise self._unusable(f'{TERM_LOGITS} of shape {logits.shape}')
+        if not np.isfinite(logits).all():
+            raise self._unusable(f'{TERM_LOGITS} that are not finite')
+        # tanh never overflows, where exp would.
+        maps: NDArray[np.float32] = 0.5 * np.tanh(0.5 * logits) + 0.5
+        return maps
+
+    def _decode(
+        self, frame: Frame, prompt: Prompt, outputs: Sequence[str]
+    ) -> list[NDArray[np.float32]]:
+        texts = self._embeddings(prompt)
+        pixels = self._preprocess(frame.image_rgb)
+        features = self._sessions['image_encoder'].run(self._features, {PIXEL_VALUES: pixels})
+        return self._sessions['decoder'].run(outputs, self._feeds(features, texts))
+
+    def _embeddings(self, prompt: Prompt) -> NDArray[np.float32]:
+        return self._text([prompt.text_for(term) for term in self._terms.all])
+
+    def _feeds(
+        self, features: Sequence[NDArray[np.float32]], texts: NDArray[np.float32]
+    ) -> dict[str, NDArray[np.float32]]:
+        feeds = dict(zip(self._features, features, strict=True))
+        feeds[TEXT_EMBEDDING] = texts
+        feeds[IS_POSITIVE] = self._is_positive
+        return feeds
+
+    def _checked(self, scores: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return scores h x w clipped to 0..1; refuse what is no score at all."""
+        if scores.ndim != 2 or scores.size == 0:
+            raise self._unusable(f'scores of shape {scores.shape}')
+        low, high = float(scores.min()), float(scores.max())
+        # A comparison with NaN is false, so NaN is refused here too.
+        if not (low >= -_ROUNDING and high <= 1.0 + _ROUNDING):
+            raise self._unusable(f'scores from {low} to {high}')
+        return np.clip(scores, np.float32(0.0), np.float32(1.0))
+
+    def _unusable(self, what: str) -> BundleError:
+        path = self._sessions['decoder'].graph.path
+        return BundleError(
+            f'{path}: gave {what} where finite maps of 0 to 1 are due; the frame gets no '
+            'heatmap, choose another bundle if this stays'
+        )

@@ -1,0 +1,61 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Families of segmentation models and how each is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+from peace_ros.domain import ConfigurationError
+from peace_ros.inference import Bundle
+from peace_ros.segmentation.clipseg import ClipSegSegmenter
+from peace_ros.segmentation.segmenter import SegmentationParameters, Segmenter
+from peace_ros.segmentation.terms import Terms
+
+BundleOrName = Bundle | Path | str
+Factory = Callable[[BundleOrName, Terms, SegmentationParameters], Segmenter]
+
+
+def _clipseg(bundle: BundleOrName, terms: Terms, parameters: SegmentationParameters) -> Segmenter:
+    loaded = bundle if isinstance(bundle, Bundle) else Bundle.load(bundle)
+    return ClipSegSegmenter(loaded, terms, parameters)
+
+
+def _fastsam(
+    bundle: BundleOrName,
+    terms: Terms,  # noqa: ARG001 - a factory's signature
+    parameters: SegmentationParameters,  # noqa: ARG001
+) -> Segmenter:
+    name = bundle.manifest.name if isinstance(bundle, Bundle) else bundle
+    raise ConfigurationError(
+        f'segmentation family fastsam (bundle {name}): its model is not part of this version; '
+        'choose a CS preset (DD-CS, D-CS or PEACE-CS) or family clipseg'
+    )
+
+
+FACTORIES: Mapping[str, Factory] = MappingProxyType({'clipseg': _clipseg, 'fastsam': _fastsam})
+
+
+def create_segmenter(
+    family: str, bundle: BundleOrName, terms: Terms, parameters: SegmentationParameters
+) -> Segmenter:
+    """Make the segmenter of a family.
+
+    Args:
+        family: a key of FACTORIES.
+        bundle: loaded, or the folder or name of one.
+        terms: what to look for.
+        parameters: of the segmentation.
+
+    Raises:
+        ConfigurationError: the family is unknown or has no model in this version.
+        BundleError: the bundle cannot be used.
+    """
+    factory = FACTORIES.get(family)
+    if factory is None:
+        raise ConfigurationError(
+            f'segmentation family {family!r} is unknown: choose one of {", ".join(FACTORIES)}'
+        )
+    return factory(bundle, terms, parameters)

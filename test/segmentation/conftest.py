@@ -1,0 +1,47 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Small real bundles for the tests of segmentation."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from peace_ros.domain import Frame
+
+
+def _load_tiny_bundles() -> ModuleType:
+    path = Path(__file__).parents[1] / 'inference' / 'tiny_bundles.py'
+    spec = importlib.util.spec_from_file_location('tiny_bundles', path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope='session')
+def tiny() -> ModuleType:
+    """The module that writes bundles."""
+    return _load_tiny_bundles()
+
+
+@pytest.fixture
+def clip_folder(tiny: Any, tmp_path: Path) -> Path:
+    return tiny.write_bundle(tmp_path / 'clip-tiny', 'clip')
+
+
+@pytest.fixture
+def clipseg_folder(tiny: Any, tmp_path: Path) -> Path:
+    return tiny.write_bundle(tmp_path / 'clipseg-tiny', 'clipseg')
+
+
+@pytest.fixture
+def frame() -> Frame:
+    rng = np.random.default_rng(7)
+    return Frame(rng.integers(0, 256, (96, 128, 3), np.uint8), 5_000)
