@@ -1,0 +1,192 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""AutopilotSim: a vehicle that flies on its own clock and speaks MAVLink."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from math import radians
+from types import TracebackType
+from typing import final
+
+from peace_ros.domain.motion import Pose
+from peace_ros.simulation.autopilot.flight import Flight
+from peace_ros.simulation.autopilot.modes import Mode, Result
+from peace_ros.simulation.autopilot.parameters import AutopilotParameters
+from peace_ros.simulation.autopilot.physics import Physics
+from peace_ros.simulation.autopilot.server import MavlinkServer
+
+LOOP_S = 0.004
+"""Wall time between two turns of the loop."""
+MAX_TURN_S = 0.1
+"""Wall time that one turn answers for at most; the rest is made up for gradually."""
+CATCH_UP = 1.5
+"""How much faster than ``speed`` the simulated clock runs while it is behind."""
+MAX_LAG_S = 2.0
+"""Wall time that is made up for; beyond it the simulated clock has run slow for good."""
+
+
+@final
+class AutopilotSim:
+    """Physics, state machine and MAVLink server of one simulated vehicle.
+
+    Either :meth:`step` it (deterministic, no thread) or let :meth:`start` run it in a thread.
+    The pilot's verbs may be called from any thread.
+
+    Args:
+        parameters: Everything that a user may choose.
+
+    Raises:
+        VehicleError: The UDP port is taken.
+    """
+
+    def __init__(self, parameters: AutopilotParameters | None = None) -> None:
+        self.parameters = parameters or AutopilotParameters()
+        self._lock = threading.RLock()
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._clock_offset_s = 0.0
+        self._remainder_s = 0.0
+        self._server = MavlinkServer(self.parameters)
+        self._flight = self._power_on()
+
+    def __enter__(self) -> AutopilotSim:
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def url(self) -> str:
+        """Where a companion connects to."""
+        return f'udpout:{self.parameters.host}:{self._server.port}'
+
+    @property
+    def time_ns(self) -> int:
+        """Simulated clock; it goes on through a reboot of the autopilot."""
+        with self._lock:
+            return round((self._clock_offset_s + self._flight.time_s) * 1e9)
+
+    @property
+    def flight(self) -> Flight:
+        """The state machine, for looking at."""
+        return self._flight
+
+    def truth(self) -> Pose:
+        """Return where the vehicle really is, relative to home, at the simulated clock."""
+        with self._lock:
+            p = self._flight.physics
+            return Pose(
+                stamp_ns=self.time_ns,
+                north_m=p.north_m,
+                east_m=p.east_m,
+                down_m=p.down_m,
+                quaternion_ned_frd=p.quaternion_ned_frd,
+                altitude_agl_m=max(0.0, -p.down_m),
+            )
+
+    def step(self, dt_s: float) -> None:
+        """Serve the peers and advance the simulated clock by dt_s in steps of the physics."""
+        tick = 1.0 / self.parameters.physics_rate_hz
+        with self._lock:
+            self._server.receive(self._flight)
+            self._remainder_s += dt_s
+            while self._remainder_s >= tick - 1e-9:
+                self._remainder_s -= tick
+                self._flight.step(tick)
+                self._server.send_due(self._flight)
+
+    def run(
+        self,
+        stop: threading.Event | None = None,
+        on_step: Callable[[AutopilotSim], None] | None = None,
+    ) -> None:
+        """Follow the wall clock times ``speed`` until stopped.
+
+        Args:
+            stop: Ends the loop when set; None: only :meth:`close` ends it.
+            on_step: Called after every turn of the loop (every 4 ms of wall time or more).
+        """
+        last = time.monotonic()
+        lag_s = 0.0
+        while not self._stop.is_set() and not (stop is not None and stop.is_set()):
+            now = time.monotonic()
+            lag_s = min(lag_s + now - last, MAX_LAG_S)
+            turn_s = min(lag_s, CATCH_UP * min(now - last, MAX_TURN_S))
+            lag_s -= turn_s
+            last = now
+            self.step(turn_s * self.parameters.speed)
+            if on_step is not None:
+                on_step(self)
+            self._server.wait(LOOP_S - (time.monotonic() - now))
+            time.sleep(max(0.0, LOOP_S / 2 - (time.monotonic() - now)))
+
+    def start(self) -> None:
+        """Run in a thread of its own."""
+        if self._thread is None:
+            self._thread = threading.Thread(target=self.run, name='autopilot_sim', daemon=True)
+            self._thread.start()
+
+    def close(self) -> None:
+        """Stop the thread and release the port."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join(timeout=5.0)
+        self._server.close()
+
+    def pilot_mode(self, mode: str) -> bool:
+        """Move the pilot's mode switch; tell whether the autopilot took the mode."""
+        with self._lock:
+            return self._flight.set_mode(Mode[mode]) is Result.ACCEPTED
+
+    def pilot_yaw_stick(self, yaw_rate_rad_s: float) -> None:
+        """Hold the yaw stick: it turns the vehicle in GUIDED too."""
+        with self._lock:
+            self._flight.turn_stick(yaw_rate_rad_s)
+
+    def lose_gps(self, *, stale: bool = False) -> None:
+        """Take GPS away; LOCAL_POSITION_NED stops, or goes on with old numbers when ``stale``."""
+        with self._lock:
+            self._flight.lose_gps(stale=stale)
+
+    def restore_gps(self) -> None:
+        """Give GPS back."""
+        with self._lock:
+            self._flight.restore_gps()
+
+    def lose_radio(self) -> None:
+        """Take the pilot's radio away: RTL."""
+        with self._lock:
+            self._flight.lose_radio()
+
+    def silence(self, *, silent: bool = True) -> None:
+        """Cut the MAVLink line in both directions, or mend it."""
+        with self._lock:
+            self._server.silent = silent
+
+    def reboot(self) -> None:
+        """Restart the autopilot where the vehicle is: its boot time begins at zero again."""
+        with self._lock:
+            self._clock_offset_s += self._flight.time_s
+            self._flight = Flight(self._flight.physics)
+            self._server.restart()
+
+    def _power_on(self) -> Flight:
+        p = self.parameters
+        physics = Physics(
+            p.start_north_m,
+            p.start_east_m,
+            radians(p.start_heading_deg),
+            wind_to_m_s=(p.wind_to_north_m_s, p.wind_to_east_m_s),
+            gust_m_s=p.gust_m_s,
+            seed=p.seed,
+        )
+        return Flight(physics)

@@ -1,0 +1,240 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The state machine of the simulated autopilot: arming, modes, take-off, landing, failsafes.
+
+Pure: it knows the physics and the filter, but no socket and no wall clock. What it wants to tell
+the ground lies in ``texts`` until the server takes it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from peace_ros.simulation.autopilot.estimator import Estimator
+from peace_ros.simulation.autopilot.guided import PositionTarget
+from peace_ros.simulation.autopilot.modes import RULES, LandedState, Mode, Result, Severity
+from peace_ros.simulation.autopilot.physics import Physics
+from peace_ros.simulation.autopilot.steering import Steering
+
+AUTO_DISARM_S = 10.0
+LANDED_AFTER_S = 1.0
+"""Time on the ground after which the vehicle calls itself landed."""
+SPOOL_UP_S = 2.5
+PREARM_TEXT_EVERY_S = 30.0
+FORCE_MAGIC = 21196
+"""param2 of the arm command that skips the checks."""
+
+
+class Flight:
+    """One power-on of the autopilot."""
+
+    def __init__(self, physics: Physics) -> None:
+        self.physics = physics
+        self.estimator = Estimator()
+        self.time_s = 0.0
+        self.mode = Mode.STABILIZE
+        self.armed = False
+        self.landed = True
+        self.texts: deque[tuple[Severity, str]] = deque(maxlen=100)
+        self.mode_changes = 0
+        self.home_changes = 0
+        self.home_m = (physics.north_m, physics.east_m, 0.0)
+        """Launch point, local NED; set again at each arming."""
+        self._last_position_m = self.home_m
+        self._steering = Steering(physics)
+        self._on_ground_s = 0.0
+        self._armed_idle_s = 0.0
+        self._next_prearm_text_s = 5.0
+        self._was_ready = False
+        self._say(Severity.INFO, 'ArduCopter V4.7.0 (peace_ros simulation)')
+
+    @property
+    def has_position(self) -> bool:
+        """The filter knows where it is, well enough for GUIDED."""
+        return self.estimator.has_position(self.time_s)
+
+    @property
+    def position_m(self) -> tuple[float, float, float]:
+        """North, east, down as the filter believes them."""
+        if self.estimator.stale_position and not self.has_position:
+            return self._last_position_m
+        offset = self.estimator.offset_m
+        truth = self._truth
+        return truth[0] + offset[0], truth[1] + offset[1], truth[2] + offset[2]
+
+    @property
+    def landed_state(self) -> LandedState:
+        """What EXTENDED_SYS_STATE says."""
+        if self.landed:
+            taking_off = self.armed and self._steering.taking_off
+            return LandedState.TAKEOFF if taking_off else LandedState.ON_GROUND
+        if self._steering.taking_off:
+            return LandedState.TAKEOFF
+        if self._steering.landing(self.mode):
+            return LandedState.LANDING
+        return LandedState.IN_AIR
+
+    @property
+    def _truth(self) -> tuple[float, float, float]:
+        return self.physics.north_m, self.physics.east_m, self.physics.down_m
+
+    def step(self, dt_s: float) -> None:
+        """Advance the clock, the failsafes and the vehicle."""
+        self.time_s += dt_s
+        failsafe = self.estimator.step(self.time_s)
+        self._tell_readiness()
+        if failsafe and self.armed and not self.landed and RULES[self.mode].needs_position:
+            self._say(Severity.CRITICAL, 'EKF Failsafe: changed to LAND Mode')
+            self._enter(Mode.LAND)
+        if self._steering.wants_land(self.mode):
+            self._enter(Mode.LAND)
+        command = self._steering.command(
+            dt_s, self.mode, armed=self.armed, landed=self.landed, has_position=self.has_position
+        )
+        self.physics.step(dt_s, command)
+        self._feel_ground(dt_s)
+
+    def set_mode(self, number: int) -> Result:
+        """Change the mode for whoever asks: companion, ground station or switch."""
+        try:
+            mode = Mode(number)
+        except ValueError:
+            self._say(Severity.WARNING, f'Mode change failed: no such mode {number}')
+            return Result.FAILED
+        if mode is self.mode:
+            return Result.ACCEPTED
+        # Disarmed, any mode may be chosen: the arming checks look at the position then.
+        if self.armed and RULES[mode].needs_position and not self.has_position:
+            self._say(Severity.WARNING, f'Mode change to {mode.name} failed: requires position')
+            return Result.FAILED
+        self._enter(mode)
+        return Result.ACCEPTED
+
+    def arm(self, *, force: bool = False) -> Result:
+        """Start the motors if mode and checks allow it."""
+        if self.armed:
+            return Result.ACCEPTED
+        if not RULES[self.mode].armable:
+            self._say(Severity.CRITICAL, f'Arm: {self.mode.name} mode not armable')
+            return Result.FAILED
+        problem = self.prearm_problem()
+        if problem and not force:
+            self._say(Severity.CRITICAL, f'Arm: {problem}')
+            return Result.FAILED
+        self.armed = True
+        self._armed_idle_s = 0.0
+        self._set_home()
+        self._say(Severity.INFO, 'Arming motors')
+        return Result.ACCEPTED
+
+    def disarm(self, *, force: bool = False) -> Result:
+        """Stop the motors; in the air only when forced."""
+        if self.armed and not self.landed and not force:
+            self._say(Severity.CRITICAL, 'Disarm: vehicle is flying')
+            return Result.FAILED
+        self._stop_motors()
+        return Result.ACCEPTED
+
+    def take_off(self, altitude_m: float) -> Result:
+        """Climb to an altitude above home: only in GUIDED, armed and on the ground."""
+        if self.mode is not Mode.GUIDED or not self.armed or not self.landed or altitude_m <= 0.0:
+            return Result.FAILED
+        self._steering.take_off(altitude_m, SPOOL_UP_S)
+        self._armed_idle_s = 0.0
+        return Result.ACCEPTED
+
+    def take_velocity(self, target: PositionTarget) -> None:
+        """Take a set-point, which only GUIDED obeys; it ends a take-off."""
+        if self.mode is Mode.GUIDED:
+            self._steering.take_velocity(target)
+
+    def take_attitude(
+        self, lean_rad: tuple[float, float], yaw_rad: float | None, thrust: float
+    ) -> None:
+        """Take SET_ATTITUDE_TARGET, which only GUIDED_NOGPS obeys."""
+        if self.mode is Mode.GUIDED_NOGPS:
+            self._steering.take_attitude(lean_rad, yaw_rad, thrust)
+
+    def see(self, seen_m: tuple[float, float, float]) -> None:
+        """Take a position of external navigation."""
+        self.estimator.see(self.time_s, seen_m, self._truth)
+
+    def turn_stick(self, yaw_rate_rad_s: float) -> None:
+        """Move the pilot's yaw stick: it turns the vehicle in GUIDED too."""
+        self._steering.stick_yaw_rate_rad_s = yaw_rate_rad_s
+
+    def lose_gps(self, *, stale: bool) -> None:
+        """Take GPS away; the last position is repeated when ``stale``."""
+        self.estimator.gps = False
+        self.estimator.stale_position = stale
+        self._last_position_m = self.position_m
+
+    def restore_gps(self) -> None:
+        """Give GPS back."""
+        self.estimator.gps = True
+
+    def lose_radio(self) -> None:
+        """Radio failsafe: RTL, or LAND where that needs a position that is missing."""
+        self._say(Severity.CRITICAL, 'Radio Failsafe')
+        if self.armed and not self.landed and self.set_mode(Mode.RTL) is not Result.ACCEPTED:
+            self._enter(Mode.LAND)
+
+    def prearm_problem(self) -> str:
+        """Return why arming is refused now; empty when it is not."""
+        if not self.estimator.has_origin(self.time_s):
+            return 'GPS 1: Bad fix'
+        if RULES[self.mode].needs_position and not self.has_position:
+            return 'Need Position Estimate'
+        if not self.has_position and self.estimator.gps:
+            return 'AHRS: waiting for home'
+        return ''
+
+    def _enter(self, mode: Mode) -> None:
+        self.mode = mode
+        self.mode_changes += 1
+        self._steering.enter(mode, has_position=self.has_position)
+
+    def _stop_motors(self) -> None:
+        if not self.armed:
+            return
+        self.armed = False
+        self._steering.enter(self.mode, has_position=self.has_position)
+        self._say(Severity.INFO, 'Disarming motors')
+
+    def _set_home(self) -> None:
+        if self.has_position:
+            north, east, _ = self.position_m
+            self.home_m = (north, east, 0.0)
+            self.home_changes += 1
+
+    def _tell_readiness(self) -> None:
+        ready = self.has_position
+        if ready and not self._was_ready:
+            self._say(Severity.INFO, 'EKF3 IMU0 is using GPS')
+            if self.home_changes == 0:
+                self._set_home()
+        self._was_ready = ready
+        if self.time_s < self._next_prearm_text_s:
+            return
+        self._next_prearm_text_s += PREARM_TEXT_EVERY_S
+        problem = self.prearm_problem()
+        if problem and not self.armed:
+            self._say(Severity.CRITICAL, f'PreArm: {problem}')
+
+    def _feel_ground(self, dt_s: float) -> None:
+        if not self.physics.on_ground:
+            self.landed = False
+            self._on_ground_s = self._armed_idle_s = 0.0
+            return
+        if self._steering.taking_off:
+            return
+        self._on_ground_s += dt_s
+        self.landed = self.landed or self._on_ground_s >= LANDED_AFTER_S
+        if not (self.landed and self.armed):
+            return
+        self._armed_idle_s += dt_s
+        if self._steering.landing(self.mode) or self._armed_idle_s >= AUTO_DISARM_S:
+            self._stop_motors()
+
+    def _say(self, severity: Severity, text: str) -> None:
+        self.texts.append((severity, text))

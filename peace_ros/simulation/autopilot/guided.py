@@ -1,0 +1,74 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How GUIDED reads SET_POSITION_TARGET_LOCAL_NED: frames, type masks, age."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, cos, hypot, isfinite, sin
+
+GUID_TIMEOUT_S = 3.0
+"""Age at which the vehicle stops obeying a velocity set-point and hovers."""
+TURNING_SPEED_M_S = 0.5
+"""Slower set-points do not turn the nose to the direction of travel."""
+
+ROTATED_BY_HEADING: dict[int, bool] = {1: False, 7: False, 8: True, 9: True}
+"""MAV_FRAME -> its velocities are (forward, right, down); any other frame is not understood."""
+
+VELOCITY_IGNORED = 0x038
+FORCE = 0x200
+YAW_IGNORED = 0x400
+YAW_RATE_IGNORED = 0x800
+
+
+@dataclass(frozen=True)
+class PositionTarget:
+    """The fields of SET_POSITION_TARGET_LOCAL_NED that matter for velocity control."""
+
+    frame: int
+    type_mask: int
+    velocity_m_s: tuple[float, float, float]
+    yaw_rad: float = 0.0
+    yaw_rate_rad_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class GuidedVelocity:
+    """A velocity set-point as the vehicle understood it, local NED."""
+
+    v_north_m_s: float
+    v_east_m_s: float
+    v_down_m_s: float
+    yaw_rad: float | None
+    yaw_rate_rad_s: float
+
+
+STOP = GuidedVelocity(0.0, 0.0, 0.0, None, 0.0)
+
+
+def understand(target: PositionTarget, heading_rad: float) -> GuidedVelocity | None:
+    """Return what the vehicle will do; STOP for what it rejects; None for numbers that are none.
+
+    ArduCopter rejects an unknown frame or mask without an error message, and stops.
+    """
+    if not all(isfinite(v) for v in target.velocity_m_s):
+        return None
+    rotated = ROTATED_BY_HEADING.get(target.frame)
+    if rotated is None or target.type_mask & (VELOCITY_IGNORED | FORCE):
+        return STOP
+    north, east, down = target.velocity_m_s
+    if rotated:
+        c, s = cos(heading_rad), sin(heading_rad)
+        north, east = north * c - east * s, north * s + east * c
+    uses_yaw = not target.type_mask & YAW_IGNORED
+    uses_rate = not target.type_mask & YAW_RATE_IGNORED
+    if (uses_yaw and not isfinite(target.yaw_rad)) or (
+        uses_rate and not isfinite(target.yaw_rate_rad_s)
+    ):
+        return None
+    yaw: float | None = None
+    if uses_yaw:
+        yaw = target.yaw_rad + (heading_rad if rotated else 0.0)
+    elif not uses_rate and hypot(north, east) > TURNING_SPEED_M_S:
+        yaw = atan2(east, north)
+    return GuidedVelocity(north, east, down, yaw, target.yaw_rate_rad_s if uses_rate else 0.0)

@@ -1,0 +1,60 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of the simulated autopilot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from peace_ros.domain.parameters import check, parameter
+
+
+@dataclass(frozen=True)
+class AutopilotParameters:
+    """What a user may choose of the simulated vehicle and its server."""
+
+    host: str = parameter('127.0.0.1', 'Address on which the MAVLink server listens.')
+    port: int = parameter(
+        14550, 'UDP port of the MAVLink server; 0 lets the system choose.', low=0, high=65535
+    )
+    system_id: int = parameter(1, 'MAVLink system id of the vehicle.', low=1, high=254)
+    start_north_m: float = parameter(
+        0.0, 'Where the vehicle boots, north of the home point.', unit='m', low=-1e5, high=1e5
+    )
+    start_east_m: float = parameter(
+        0.0, 'Where the vehicle boots, east of the home point.', unit='m', low=-1e5, high=1e5
+    )
+    start_heading_deg: float = parameter(
+        0.0, 'Heading at boot, clockwise from north.', unit='deg', low=-360.0, high=360.0
+    )
+    home_latitude_deg: float = parameter(
+        48.858, 'Latitude of the home point.', unit='deg', low=-85.0, high=85.0
+    )
+    home_longitude_deg: float = parameter(
+        2.342, 'Longitude of the home point.', unit='deg', low=-180.0, high=180.0
+    )
+    home_altitude_msl_m: float = parameter(
+        35.0, 'Altitude of the flat ground above sea level.', unit='m', low=-500.0, high=9000.0
+    )
+    wind_to_north_m_s: float = parameter(
+        0.0, 'Mean wind, the way the air moves, to the north.', unit='m/s', low=-20.0, high=20.0
+    )
+    wind_to_east_m_s: float = parameter(
+        0.0, 'Mean wind, the way the air moves, to the east.', unit='m/s', low=-20.0, high=20.0
+    )
+    gust_m_s: float = parameter(
+        0.0, 'Standard deviation of the gusts along each axis.', unit='m/s', low=0.0, high=5.0
+    )
+    seed: int = parameter(0, 'Seed of the gusts.', low=0, high=2**31 - 1)
+    speed: float = parameter(
+        1.0, 'Simulated seconds per second of the wall clock.', low=0.1, high=50.0
+    )
+    physics_rate_hz: float = parameter(
+        100.0, 'Rate of the physics on the simulated clock.', unit='Hz', low=50.0, high=400.0
+    )
+    rangefinder_max_m: float = parameter(
+        40.0, 'Range of the downward rangefinder.', unit='m', low=1.0, high=500.0
+    )
+
+    def __post_init__(self) -> None:
+        check(self)

@@ -1,0 +1,253 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""MAVLink 2 over one UDP port: any number of peers, each with its own message intervals."""
+
+from __future__ import annotations
+
+import select
+import socket
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from peace_ros.domain.errors import VehicleError
+from peace_ros.simulation.autopilot.commands import Params, run_command, run_message
+from peace_ros.simulation.autopilot.flight import Flight
+from peace_ros.simulation.autopilot.modes import Result
+from peace_ros.simulation.autopilot.parameters import AutopilotParameters
+from peace_ros.simulation.autopilot.streams import Streams
+
+COMPONENT_ID = mavlink.MAV_COMP_ID_AUTOPILOT1
+HEARTBEAT_S = 1.0
+TIMESYNC_S = 10.0
+MAX_PEERS = 32
+MAX_DATAGRAMS = 256
+"""Datagrams taken in one turn, so that a flood cannot stop the physics."""
+TEXT_BYTES = 50
+Address = tuple[str, int]
+
+
+@dataclass
+class Peer:
+    """Somebody who has spoken to the server."""
+
+    codec: Any
+    address: Address
+    interval_s: dict[int, float] = field(default_factory=dict)
+    due_s: dict[int, float] = field(default_factory=dict)
+    turn: int = 0
+    """Number of the message that was heard last, for finding who is silent longest."""
+
+
+class MavlinkServer:
+    """Single-threaded: call :meth:`receive` and :meth:`send_due` from the loop that steps."""
+
+    def __init__(self, parameters: AutopilotParameters) -> None:
+        self._parameters = parameters
+        self._streams = Streams(parameters)
+        self._peers: dict[Address, Peer] = {}
+        self._values: dict[str, float] = {
+            'GUID_TIMEOUT': 3.0,
+            'GUID_OPTIONS': 0.0,
+            'LAND_SPEED': 50.0,
+            'RTL_ALT': 1500.0,
+            'FRAME_CLASS': 1.0,
+            'SYSID_THISMAV': float(parameters.system_id),
+            'FS_THR_ENABLE': 1.0,
+            'FS_EKF_ACTION': 1.0,
+        }
+        self._turn = 0
+        self._seen = (0, 0)
+        self._heartbeat_due_s = 0.0
+        self._timesync_due_s = TIMESYNC_S
+        self.silent = False
+        self.rejected_bytes = 0
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind((parameters.host, parameters.port))
+        except OSError as error:
+            self._socket.close()
+            raise VehicleError(
+                f'simulated autopilot on UDP {parameters.host}:{parameters.port}: {error.strerror};'
+                ' end the process that holds the port or choose another'
+            ) from error
+        self._socket.setblocking(False)
+
+    @property
+    def port(self) -> int:
+        """UDP port that it listens on."""
+        return int(self._socket.getsockname()[1])
+
+    def close(self) -> None:
+        """Release the port."""
+        self._socket.close()
+
+    def restart(self) -> None:
+        """Forget intervals and schedules, as a reboot does; addresses stay known."""
+        self._seen = (0, 0)
+        self._heartbeat_due_s, self._timesync_due_s = 0.0, TIMESYNC_S
+        for peer in self._peers.values():
+            peer.interval_s.clear()
+            peer.due_s.clear()
+
+    def wait(self, seconds: float) -> None:
+        """Sleep until a datagram arrives, at most so long."""
+        select.select([self._socket], [], [], max(0.0, seconds))
+
+    def receive(self, flight: Flight) -> None:
+        """Take what has arrived; what is not MAVLink is counted and forgotten."""
+        for _ in range(MAX_DATAGRAMS):
+            try:
+                data, address = self._socket.recvfrom(65535)
+            except BlockingIOError:
+                return
+            except ConnectionError:
+                continue  # a peer that went away answers with an ICMP error
+            if self.silent:
+                continue
+            for message in self._decode(data):
+                self._handle(flight, self._peer(address), message)
+
+    def send_due(self, flight: Flight) -> None:
+        """Send what the clock and the flight's news ask for."""
+        news = (flight.mode_changes, flight.home_changes)
+        if flight.time_s >= self._heartbeat_due_s or news[0] != self._seen[0]:
+            self._heartbeat_due_s = flight.time_s + HEARTBEAT_S
+            self._tell_all(self._streams.build(mavlink.MAVLINK_MSG_ID_HEARTBEAT, flight))
+        if news[1] != self._seen[1]:
+            self._tell_all(self._streams.home_position(flight))
+        self._seen = news
+        if flight.time_s >= self._timesync_due_s:
+            self._timesync_due_s = flight.time_s + TIMESYNC_S
+            self._tell_all(mavlink.MAVLink_timesync_message(0, round(flight.time_s * 1e9)))
+        while self._peers and flight.texts:
+            severity, text = flight.texts.popleft()
+            raw = text.encode('ascii', 'replace')[:TEXT_BYTES]
+            self._tell_all(mavlink.MAVLink_statustext_message(int(severity), raw))
+        for peer in self._peers.values():
+            self._send_streams(flight, peer)
+
+    def _send_streams(self, flight: Flight, peer: Peer) -> None:
+        for message_id, interval in peer.interval_s.items():
+            due = peer.due_s[message_id]
+            if flight.time_s < due:
+                continue
+            late = flight.time_s - due > interval
+            peer.due_s[message_id] = (flight.time_s if late else due) + interval
+            self._tell(peer, self._streams.build(message_id, flight))
+
+    def _decode(self, data: bytes) -> list[Any]:
+        # A parser for each datagram: a broken one must not swallow the beginning of the next.
+        codec = mavlink.MAVLink(None)
+        codec.robust_parsing = True
+        try:
+            messages = codec.parse_buffer(bytearray(data)) or []
+        except mavlink.MAVError:
+            self.rejected_bytes += len(data)
+            return []
+        good = [m for m in messages if m.get_msgId() >= 0]
+        if len(good) != len(messages) or not good:
+            self.rejected_bytes += len(data)
+        return good
+
+    def _peer(self, address: Address) -> Peer:
+        peer = self._peers.get(address)
+        if peer is None:
+            if len(self._peers) >= MAX_PEERS:
+                silent = min(self._peers.values(), key=lambda each: each.turn)
+                del self._peers[silent.address]
+            codec = mavlink.MAVLink(None, self._parameters.system_id, COMPONENT_ID)
+            peer = self._peers[address] = Peer(codec, address)
+        self._turn += 1
+        peer.turn = self._turn
+        return peer
+
+    def _handle(self, flight: Flight, peer: Peer, message: Any) -> None:
+        target = getattr(message, 'target_system', 0)
+        if target not in {0, self._parameters.system_id}:
+            return
+        kind = message.get_type()
+        if kind in {'COMMAND_LONG', 'COMMAND_INT'}:
+            self._command(flight, peer, message)
+        elif kind == 'TIMESYNC':
+            if message.tc1 == 0:
+                now = max(1, round(flight.time_s * 1e9))  # zero would be a question, not an answer
+                self._tell(peer, mavlink.MAVLink_timesync_message(now, message.ts1))
+        elif kind.startswith('PARAM_'):
+            self._parameter(peer, message)
+        else:
+            run_message(flight, message)
+
+    def _command(self, flight: Flight, peer: Peer, m: Any) -> None:
+        if m.get_type() == 'COMMAND_INT':
+            p: Params = (m.param1, m.param2, m.param3, m.param4, float(m.x), float(m.y), m.z)
+        else:
+            p = (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7)
+        wanted: int | None = None
+        if m.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
+            result = self._set_interval(flight, peer, p)
+        elif m.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
+            known = isfinite(p[0]) and self._streams.knows(int(p[0]))
+            wanted = int(p[0]) if known else None
+            result = Result.ACCEPTED if known else Result.FAILED
+        else:
+            result = run_command(flight, m.command, p)
+        # MAVLink 2 extension fields say who asked.
+        self._tell(
+            peer,
+            mavlink.MAVLink_command_ack_message(
+                m.command, int(result), 0, 0, m.get_srcSystem(), m.get_srcComponent()
+            ),
+        )
+        if wanted is not None:
+            self._tell(peer, self._streams.build(wanted, flight))
+
+    def _set_interval(self, flight: Flight, peer: Peer, p: Params) -> Result:
+        if not (isfinite(p[0]) and isfinite(p[1])) or not self._streams.knows(int(p[0])):
+            return Result.DENIED
+        message_id = int(p[0])
+        if p[1] <= 0.0:
+            peer.interval_s.pop(message_id, None)
+            return Result.ACCEPTED
+        peer.interval_s[message_id] = max(p[1] * 1e-6, 1.0 / self._parameters.physics_rate_hz)
+        peer.due_s[message_id] = flight.time_s
+        return Result.ACCEPTED
+
+    def _parameter(self, peer: Peer, m: Any) -> None:
+        names = sorted(self._values)
+        kind = m.get_type()
+        if kind == 'PARAM_REQUEST_LIST':
+            wanted = names
+        elif kind == 'PARAM_REQUEST_READ' and m.param_index >= 0:
+            wanted = names[m.param_index : m.param_index + 1]
+        elif kind in {'PARAM_REQUEST_READ', 'PARAM_SET'}:
+            wanted = [name for name in names if name == m.param_id]
+            if kind == 'PARAM_SET' and wanted and isfinite(m.param_value):
+                self._values[m.param_id] = m.param_value
+        else:
+            return
+        for name in wanted:
+            value = mavlink.MAVLink_param_value_message(
+                name.encode(),
+                self._values[name],
+                mavlink.MAV_PARAM_TYPE_REAL32,
+                len(names),
+                names.index(name),
+            )
+            self._tell(peer, value)
+
+    def _tell_all(self, message: Any) -> None:
+        for peer in self._peers.values():
+            self._tell(peer, message)
+
+    def _tell(self, peer: Peer, message: Any) -> None:
+        if message is None or self.silent:
+            return
+        data = message.pack(peer.codec)
+        peer.codec.seq = (peer.codec.seq + 1) % 256
+        try:
+            self._socket.sendto(data, peer.address)
+        except OSError:
+            self.rejected_bytes += len(data)  # a full buffer loses a datagram, as UDP does

@@ -1,0 +1,24 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Setpoint to MAVLink and MAVLink to Telemetry."""
+
+from peace_ros.vehicle.link import VehicleLink, open_vehicle
+from peace_ros.vehicle.mavlink import MavlinkLink
+from peace_ros.vehicle.parameters import SenderParameters, VehicleParameters
+from peace_ros.vehicle.pilot import Pilot
+from peace_ros.vehicle.result import Answer, RequestResult
+from peace_ros.vehicle.sender import SenderState, SenderStatistics, SetpointSender
+
+__all__ = [
+    'Answer',
+    'MavlinkLink',
+    'Pilot',
+    'RequestResult',
+    'SenderParameters',
+    'SenderState',
+    'SenderStatistics',
+    'SetpointSender',
+    'VehicleLink',
+    'VehicleParameters',
+    'open_vehicle',
+]

@@ -1,0 +1,222 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What differs between autopilots: mode numbers, the mode that obeys set-points, its message."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from peace_ros.domain.errors import VehicleError
+from peace_ros.domain.motion import Setpoint
+
+VELOCITY_HOLD_HEADING = 0x5C7
+"""Type mask: use velocity and yaw rate (which is zero), ignore everything else.
+
+The mask without yaw rate (0xDC7) would turn the nose to the direction of travel.
+"""
+CUSTOM_MODE = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+
+ModeCommand = tuple[float, float, float]
+"""The first three parameters of MAV_CMD_DO_SET_MODE."""
+
+
+class Dialect(Protocol):
+    """One autopilot's way of speaking."""
+
+    @property
+    def name(self) -> str:
+        """What a user calls it."""
+        ...
+
+    @property
+    def autopilot(self) -> int:
+        """MAV_AUTOPILOT in HEARTBEAT."""
+        ...
+
+    @property
+    def streams_before_control(self) -> bool:
+        """Set-points must flow before the mode that obeys them is entered."""
+        ...
+
+    @property
+    def control_mode(self) -> str:
+        """Name of the mode that obeys set-points."""
+        ...
+
+    @property
+    def hold_mode(self) -> str:
+        """Name of the autopilot's own mode for holding position."""
+        ...
+
+    def mode_name(self, custom_mode: int) -> str:
+        """Return the autopilot's own name of a mode."""
+        ...
+
+    def mode_command(self, mode: str) -> ModeCommand:
+        """Return the parameters of MAV_CMD_DO_SET_MODE; VehicleError for an unknown mode."""
+        ...
+
+    def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
+        """Return the set-point as a message to (system, component)."""
+        ...
+
+
+def _velocity_message(setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
+    return mavlink.MAVLink_set_position_target_local_ned_message(
+        boot_ms & 0xFFFFFFFF,
+        target[0],
+        target[1],
+        mavlink.MAV_FRAME_LOCAL_NED,
+        VELOCITY_HOLD_HEADING,
+        0.0,
+        0.0,
+        0.0,
+        setpoint.v_north_m_s,
+        setpoint.v_east_m_s,
+        setpoint.v_down_m_s,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
+
+
+def _unknown_mode(mode: str, known: list[str]) -> VehicleError:
+    return VehicleError(f'mode {mode!r} is unknown: choose one of {", ".join(sorted(known))}')
+
+
+ARDUCOPTER_MODES: dict[str, int] = {
+    'STABILIZE': 0,
+    'ACRO': 1,
+    'ALT_HOLD': 2,
+    'AUTO': 3,
+    'GUIDED': 4,
+    'LOITER': 5,
+    'RTL': 6,
+    'CIRCLE': 7,
+    'LAND': 9,
+    'DRIFT': 11,
+    'SPORT': 13,
+    'FLIP': 14,
+    'AUTOTUNE': 15,
+    'POSHOLD': 16,
+    'BRAKE': 17,
+    'THROW': 18,
+    'AVOID_ADSB': 19,
+    'GUIDED_NOGPS': 20,
+    'SMART_RTL': 21,
+    'FLOWHOLD': 22,
+    'FOLLOW': 23,
+    'ZIGZAG': 24,
+    'SYSTEMID': 25,
+    'AUTOROTATE': 26,
+    'AUTO_RTL': 27,
+    'TURTLE': 28,
+}
+
+
+@dataclass(frozen=True)
+class ArduPilot:
+    """ArduCopter: GUIDED obeys set-points (ArduPilot documentation, Copter commands in GUIDED)."""
+
+    hold_mode: str = 'BRAKE'
+    name: str = 'ardupilot'
+    autopilot: int = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+    streams_before_control: bool = False
+    control_mode: str = 'GUIDED'
+    _names: dict[int, str] = field(
+        default_factory=lambda: {number: name for name, number in ARDUCOPTER_MODES.items()}
+    )
+
+    def mode_name(self, custom_mode: int) -> str:
+        """Return e.g. GUIDED; MODE 99 for one that is not known."""
+        return self._names.get(custom_mode, f'MODE {custom_mode}')
+
+    def mode_command(self, mode: str) -> ModeCommand:
+        """Return (flags, mode number, 0)."""
+        if mode not in ARDUCOPTER_MODES:
+            raise _unknown_mode(mode, list(ARDUCOPTER_MODES))
+        return float(CUSTOM_MODE), float(ARDUCOPTER_MODES[mode]), 0.0
+
+    def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
+        """Return SET_POSITION_TARGET_LOCAL_NED, frame LOCAL_NED, heading held."""
+        return _velocity_message(setpoint, boot_ms, target)
+
+
+PX4_MODES: dict[str, tuple[int, int]] = {
+    'MANUAL': (1, 0),
+    'ALTCTL': (2, 0),
+    'POSCTL': (3, 0),
+    'AUTO.READY': (4, 1),
+    'AUTO.TAKEOFF': (4, 2),
+    'AUTO.LOITER': (4, 3),
+    'AUTO.MISSION': (4, 4),
+    'AUTO.RTL': (4, 5),
+    'AUTO.LAND': (4, 6),
+    'ACRO': (5, 0),
+    'OFFBOARD': (6, 0),
+    'STABILIZED': (7, 0),
+}
+"""Main and sub mode: bits 16 to 23 and 24 to 31 of custom_mode (PX4 px4_custom_mode.h)."""
+
+
+@dataclass(frozen=True)
+class Px4:
+    """PX4: OFFBOARD, entered only while set-points flow at 2 Hz or more."""
+
+    name: str = 'px4'
+    autopilot: int = mavlink.MAV_AUTOPILOT_PX4
+    streams_before_control: bool = True
+    control_mode: str = 'OFFBOARD'
+    hold_mode: str = 'AUTO.LOITER'
+    _names: dict[tuple[int, int], str] = field(
+        default_factory=lambda: {numbers: name for name, numbers in PX4_MODES.items()}
+    )
+
+    def mode_name(self, custom_mode: int) -> str:
+        """Return e.g. OFFBOARD; MODE 4.9 for one that is not known."""
+        main, sub = (custom_mode >> 16) & 0xFF, (custom_mode >> 24) & 0xFF
+        return self._names.get((main, sub), f'MODE {main}.{sub}')
+
+    def mode_command(self, mode: str) -> ModeCommand:
+        """Return (flags, main mode, sub mode)."""
+        if mode not in PX4_MODES:
+            raise _unknown_mode(mode, list(PX4_MODES))
+        main, sub = PX4_MODES[mode]
+        return float(CUSTOM_MODE), float(main), float(sub)
+
+    def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
+        """Return SET_POSITION_TARGET_LOCAL_NED, frame LOCAL_NED, heading held."""
+        return _velocity_message(setpoint, boot_ms, target)
+
+
+DIALECTS = ('auto', 'ardupilot', 'px4')
+
+
+def choose_dialect(wanted: str, autopilot: int, hold_mode: str = 'BRAKE') -> Dialect:
+    """Return the dialect of the autopilot that was heard.
+
+    Args:
+        wanted: ``auto``, ``ardupilot`` or ``px4``.
+        autopilot: MAV_AUTOPILOT of its HEARTBEAT.
+        hold_mode: ArduPilot's mode for holding position.
+
+    Raises:
+        VehicleError: Unknown name, or the autopilot heard is another one than was asked for.
+    """
+    if wanted not in DIALECTS:
+        raise VehicleError(f'dialect {wanted!r}: choose one of {", ".join(DIALECTS)}')
+    known: tuple[Dialect, ...] = (ArduPilot(hold_mode=hold_mode), Px4())
+    for dialect in known:
+        if dialect.autopilot == autopilot:
+            if wanted not in {'auto', dialect.name}:
+                break
+            return dialect
+    raise VehicleError(
+        f'the autopilot heard is of type {autopilot} (MAV_AUTOPILOT) and does not speak '
+        f'{wanted!r}: connect to ArduPilot (3) or PX4 (12), or set dialect to auto'
+    )

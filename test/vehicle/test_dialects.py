@@ -1,0 +1,63 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Mode numbers and set-point messages of each autopilot."""
+
+import pytest
+
+from peace_ros.domain import Setpoint, VehicleError
+from peace_ros.vehicle.dialects import ArduPilot, Px4, choose_dialect
+
+
+@pytest.mark.parametrize(
+    ('dialect', 'custom_mode', 'name'),
+    [
+        (ArduPilot(), 4, 'GUIDED'),
+        (ArduPilot(), 5, 'LOITER'),
+        (ArduPilot(), 9, 'LAND'),
+        (ArduPilot(), 17, 'BRAKE'),
+        (ArduPilot(), 99, 'MODE 99'),
+        (Px4(), 6 << 16, 'OFFBOARD'),
+        (Px4(), 4 << 16 | 3 << 24, 'AUTO.LOITER'),
+        (Px4(), 3 << 16, 'POSCTL'),
+        (Px4(), 4 << 16 | 9 << 24, 'MODE 4.9'),
+    ],
+)
+def test_names_modes(dialect, custom_mode, name):
+    assert dialect.mode_name(custom_mode) == name
+
+
+@pytest.mark.parametrize(
+    ('dialect', 'control', 'hold'),
+    [
+        (ArduPilot(), (1, 4, 0), (1, 17, 0)),
+        (ArduPilot(hold_mode='LOITER'), (1, 4, 0), (1, 5, 0)),
+        (Px4(), (1, 6, 0), (1, 4, 3)),
+    ],
+)
+def test_asks_for_control_and_hold(dialect, control, hold):
+    assert dialect.mode_command(dialect.control_mode) == control
+    assert dialect.mode_command(dialect.hold_mode) == hold
+
+
+@pytest.mark.parametrize('dialect', [ArduPilot(), Px4()])
+def test_setpoints_hold_the_heading_in_local_ned(dialect):
+    m = dialect.velocity_message(Setpoint(0, 1.0, 2.0, 3.0), 2**32 + 5, (1, 1))
+    assert (m.coordinate_frame, m.type_mask, m.yaw_rate) == (1, 0x5C7, 0.0)
+    assert (m.vx, m.vy, m.vz) == (1.0, 2.0, 3.0)
+    assert m.time_boot_ms == 5
+
+
+def test_finds_the_dialect_in_the_heartbeat():
+    assert choose_dialect('auto', 3).name == 'ardupilot'
+    assert choose_dialect('auto', 12).name == 'px4'
+
+
+@pytest.mark.parametrize(('wanted', 'autopilot'), [('px4', 3), ('auto', 0), ('betaflight', 3)])
+def test_says_when_nothing_fits(wanted, autopilot):
+    with pytest.raises(VehicleError, match=wanted):
+        choose_dialect(wanted, autopilot)
+
+
+def test_an_unknown_mode_names_the_known_ones():
+    with pytest.raises(VehicleError, match=r"'HOVER'.*GUIDED"):
+        ArduPilot().mode_command('HOVER')
