@@ -31,8 +31,6 @@ class Material:
     """Wave vector in cycles per metre."""
     stripe: float = 0.0
     """Relative amplitude of the stripes."""
-    gloss: float = 0.0
-    """Strength of sky glint: only water has some."""
 
 
 _G, _B, _P, _W = Label.GRASS, Label.BARE_GROUND, Label.PAVED, Label.WATER
@@ -119,10 +117,7 @@ class Palette:
         wave = (0.0, 0.0)
         if stripe_m > 0.0:
             wave = (cos(angle_rad) / stripe_m, sin(angle_rad) / stripe_m)
-        gloss = 1.0 if label == Label.WATER else 0.0
-        return Material(
-            label, _rgb(first * gain), _rgb(second * gain), contrast, wave, stripe, gloss
-        )
+        return Material(label, _rgb(first * gain), _rgb(second * gain), contrast, wave, stripe)
 
     def crown(self) -> tuple[Rgb, str]:
         """Return the colour and kind of a tree."""

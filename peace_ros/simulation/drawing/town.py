@@ -66,7 +66,7 @@ def plan_town(rng: np.random.Generator, season: str, extent_m: float) -> Plan:
     furnisher = Furnisher(plan, rng, palette)
     half = 0.72 * extent_m + 12.0
     area = Block(-half, -half, half, half)
-    count = max(2, round(2 * half / 105.0))
+    count = max(2, round(2 * half / 118.0))
     edges = np.linspace(-half, half, count + 1)
     inner = rng.uniform(-16.0, 16.0, (2, count - 1))
     x, y = edges.copy(), edges.copy()
