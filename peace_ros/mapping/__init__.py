@@ -1,0 +1,9 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Heatmaps and poses become a map of safe ground in the local frame."""
+
+from peace_ros.mapping.layers import MapLayers
+from peace_ros.mapping.parameters import MapParameters
+from peace_ros.mapping.safety_map import SafetyMap
+
+__all__ = ['MapLayers', 'MapParameters', 'SafetyMap']

@@ -1,0 +1,67 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a map of safe ground can be told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from peace_ros.domain.parameters import check, parameter
+
+
+@dataclass(frozen=True)
+class MapParameters:
+    """Size, evidence and memory of a :class:`~peace_ros.mapping.SafetyMap`."""
+
+    map_cell_m: float = parameter(0.5, 'Edge of a map cell.', unit='m', low=0.1, high=5.0)
+    map_size_m: float = parameter(
+        240.0,
+        'Edge of the square window that follows the vehicle.',
+        unit='m',
+        low=20.0,
+        high=1000.0,
+    )
+    neutral_score: float = parameter(
+        0.5,
+        'Heatmap value that speaks neither for safe nor for unsafe: the threshold that the '
+        'manifest of the segmentation model recommends.',
+        low=0.05,
+        high=0.95,
+    )
+    look_limit: float = parameter(
+        1.5, 'Largest evidence of one look, in log-odds.', unit='nat', low=0.1, high=5.0
+    )
+    unsafe_weight: float = parameter(
+        1.5, 'Weight of evidence for unsafe against evidence for safe.', low=1.0, high=10.0
+    )
+    safe_limit: float = parameter(
+        4.0, 'Log-odds at which evidence for safe saturates.', unit='nat', low=1.0, high=10.0
+    )
+    unsafe_limit: float = parameter(
+        4.0, 'Log-odds at which evidence for unsafe saturates.', unit='nat', low=1.0, high=10.0
+    )
+    repeat_limit: float = parameter(
+        5.0,
+        'Repeated looks of the same strength add up to at most this many of them, because '
+        'frames of one scene are not independent.',
+        low=1.0,
+        high=20.0,
+    )
+    independent_after_s: float = parameter(
+        0.4, 'Frames closer in time than this count less.', unit='s', low=0.0, high=10.0
+    )
+    safe_half_life_s: float = parameter(
+        20.0, 'Evidence for safe halves in this time.', unit='s', low=1.0, high=600.0
+    )
+    unsafe_half_life_s: float = parameter(
+        60.0, 'Evidence for unsafe halves in this time.', unit='s', low=1.0, high=3600.0
+    )
+    border_fraction: float = parameter(
+        0.03, 'Part of the image at each edge that is not believed.', low=0.0, high=0.4
+    )
+    off_nadir_limit_deg: float = parameter(
+        60.0, 'Rays that slant more than this are not believed.', unit='deg', low=5.0, high=80.0
+    )
+
+    def __post_init__(self) -> None:
+        check(self)

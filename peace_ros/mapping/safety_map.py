@@ -1,0 +1,276 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A ground grid in the local frame that gathers heatmaps, forgets, and follows the vehicle.
+
+Each cell holds log-odds of being safe, in the way of occupancy grids (Moravec and Elfes, 1985),
+with three differences that people on the ground ask for: evidence for unsafe weighs more and is
+kept longer, frames of one scene are not taken for independent, and a lower look outweighs a
+higher one.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import ceil, cos, exp, floor, log
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from peace_ros.domain import Camera, Heatmap, ImageError, Pose
+from peace_ros.domain.errors import VehicleError
+from peace_ros.mapping.layers import MapLayers
+from peace_ros.mapping.parameters import MapParameters
+from peace_ros.mapping.projection import (
+    GroundGrid,
+    Window,
+    heatmap_from_ground,
+    project,
+    visible_window,
+    worst_part,
+)
+
+_NS = 1e-9
+_NEVER_S = np.float32(-1e9)
+_LOOKS_LIMIT = 60_000
+_Cell = TypeVar('_Cell', bound=np.generic)
+
+
+@lru_cache(maxsize=4)
+def _believed(width: int, height: int, border_fraction: float) -> NDArray[np.uint8]:
+    mask = np.zeros((height, width), np.uint8)
+    bx, by = round(border_fraction * width), round(border_fraction * height)
+    mask[by : height - by, bx : width - bx] = 255
+    mask.setflags(write=False)
+    return mask
+
+
+@lru_cache(maxsize=4)
+def _evidence_table(neutral_score: float, look_limit: float) -> NDArray[np.float32]:
+    """Evidence in log-odds of each heatmap value 0 to 255, zero at the neutral score."""
+    value = (np.arange(256) + 0.5) / 256.0
+    neutral = log(neutral_score / (1.0 - neutral_score))
+    evidence = np.log(value / (1.0 - value)) - neutral
+    return np.clip(evidence, -look_limit, look_limit).astype(np.float32)
+
+
+class SafetyMap:
+    """Rolling square map of how safe the ground is; not thread-safe."""
+
+    def __init__(self, parameters: MapParameters | None = None) -> None:
+        self.parameters = parameters or MapParameters()
+        self._cells = max(1, round(self.parameters.map_size_m / self.parameters.map_cell_m))
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything."""
+        shape = (self._cells, self._cells)
+        self._log_odds = np.zeros(shape, np.float32)
+        self._seen_s = np.full(shape, _NEVER_S, np.float32)
+        self._pixel_m = np.full(shape, np.inf, np.float32)
+        self._looks = np.zeros(shape, np.uint16)
+        self._first_row = self._first_column = 0
+        self._epoch_ns: int | None = None
+        self._stamp_ns = 0
+        self.revision = 0
+
+    @property
+    def stamp_ns(self) -> int | None:
+        """Stamp of the newest heatmap in the map, None when there is none."""
+        return None if self._epoch_ns is None else self._stamp_ns
+
+    def add(self, heatmap: Heatmap, camera: Camera, pose: Pose) -> int:
+        """Lay a heatmap onto level ground and return how many cells it reached.
+
+        :param camera: that of the full frame; the heatmap covers it, stretched or not.
+        :param pose: where the camera was at the heatmap's stamp.
+        :raises ImageError: on values that are not finite or not within 0 to 1, and on a stamp
+            that is not newer than the last one.
+        :raises VehicleError: on a pose that is not finite or not above ground.
+        """
+        self._check(heatmap, pose)
+        self._follow(pose)
+        if self._epoch_ns is None:
+            self._epoch_ns = heatmap.stamp_ns
+            elapsed_s = float('inf')
+        else:
+            elapsed_s = (heatmap.stamp_ns - self._stamp_ns) * _NS
+            safe_factor, unsafe_factor = self._decay(elapsed_s)
+            positive = np.maximum(self._log_odds, 0.0)
+            self._log_odds -= positive
+            self._log_odds *= unsafe_factor
+            positive *= safe_factor
+            self._log_odds += positive
+        self._stamp_ns = heatmap.stamp_ns
+        self.revision += 1
+        return self._lay(heatmap, camera, pose, elapsed_s)
+
+    def _check(self, heatmap: Heatmap, pose: Pose) -> None:
+        low, high = float(heatmap.safety.min()), float(heatmap.safety.max())
+        if not (low >= 0.0 and high <= 1.0):  # also refuses NaN
+            raise ImageError(f'heatmap with values {low} to {high}: must be finite, within 0 to 1')
+        if self._epoch_ns is not None and heatmap.stamp_ns <= self._stamp_ns:
+            raise ImageError(
+                f'heatmap stamp {heatmap.stamp_ns} ns: must be newer than the last one, '
+                f'{self._stamp_ns} ns'
+            )
+        numbers = (pose.north_m, pose.east_m, pose.altitude_agl_m, *pose.quaternion_ned_frd)
+        if not np.all(np.isfinite(numbers)) or pose.altitude_agl_m <= 0.0:
+            raise VehicleError(
+                f'pose {numbers}: must be finite and above ground to project a heatmap'
+            )
+
+    def _follow(self, pose: Pose) -> None:
+        """Move the window by whole cells once the vehicle has left its middle."""
+        cell = self.parameters.map_cell_m
+        row = round(pose.north_m / cell) - self._cells // 2
+        column = round(pose.east_m / cell) - self._cells // 2
+        slack = self._cells // 12
+        d_row, d_column = row - self._first_row, column - self._first_column
+        if abs(d_row) <= slack and abs(d_column) <= slack:
+            return
+        self._first_row, self._first_column = row, column
+        if self._epoch_ns is None:
+            return
+        self._log_odds = _shifted(self._log_odds, d_row, d_column, 0.0)
+        self._seen_s = _shifted(self._seen_s, d_row, d_column, float(_NEVER_S))
+        self._pixel_m = _shifted(self._pixel_m, d_row, d_column, float('inf'))
+        self._looks = _shifted(self._looks, d_row, d_column, 0)
+
+    def _decay(self, elapsed_s: float) -> tuple[float, float]:
+        p, elapsed_s = self.parameters, max(0.0, elapsed_s)
+        return (
+            exp(-log(2.0) * elapsed_s / p.safe_half_life_s),
+            exp(-log(2.0) * elapsed_s / p.unsafe_half_life_s),
+        )
+
+    @property
+    def _grid(self) -> GroundGrid:
+        cell = self.parameters.map_cell_m
+        south, west = self._first_row * cell, self._first_column * cell
+        return GroundGrid(south, west, cell, self._cells, self._cells)
+
+    def _lay(self, heatmap: Heatmap, camera: Camera, pose: Pose, elapsed_s: float) -> int:
+        p = self.parameters
+        height, width = heatmap.safety.shape
+        matrix = heatmap_from_ground(camera, pose, width, height)
+        window = visible_window(matrix, pose, (width, height), self._grid, p.off_nadir_limit_deg)
+        if window is None:
+            return 0
+        grid = self._grid.part(window)
+        nadir_pixel_m = pose.altitude_agl_m / camera.focal_px * camera.width_px / width
+        # Rounding down keeps the error on the side of unsafe.
+        quantised = worst_part(
+            (heatmap.safety * 255.0).astype(np.uint8), grid.cell_m / nadir_pixel_m
+        )
+        believed = _believed(width, height, p.border_fraction)
+        sampled, seen = project(quantised, believed, matrix, grid)
+        north = (np.arange(grid.rows) + 0.5) * grid.cell_m + (grid.south_m - pose.north_m)
+        east = (np.arange(grid.columns) + 0.5) * grid.cell_m + (grid.west_m - pose.east_m)
+        ground_sq = np.add.outer(north * north, east * east).astype(np.float32)
+        # Squared secant of the slant: slant distance over altitude, and the off-nadir limit.
+        secant_sq = 1.0 + ground_sq / np.float32(pose.altitude_agl_m**2)
+        seen &= secant_sq <= 1.0 / cos(np.radians(p.off_nadir_limit_deg)) ** 2
+        pixel_m = np.float32(nadir_pixel_m) * secant_sq
+        apart_s = p.independent_after_s
+        weight = 1.0 if elapsed_s >= apart_s else elapsed_s / apart_s
+        self._gather(window, sampled, seen, pixel_m, weight)
+        return int(np.count_nonzero(seen))
+
+    def _gather(
+        self,
+        window: Window,
+        sampled: NDArray[np.uint8],
+        seen: NDArray[np.bool_],
+        pixel_m: NDArray[np.float32],
+        weight: float,
+    ) -> None:
+        p = self.parameters
+        row, column, rows, columns = window
+        part = np.s_[row : row + rows, column : column + columns]
+        log_odds, cell_pixel_m = self._log_odds[part], self._pixel_m[part]
+        evidence = _evidence_table(p.neutral_score, p.look_limit)[sampled]
+        finer = pixel_m / cell_pixel_m
+        # A finer look shrinks what was known from coarser ones; a coarser look adds less to safe.
+        old = log_odds * np.minimum(finer, 1.0)
+        with np.errstate(divide='ignore'):
+            trust = weight * np.minimum(1.0, 1.0 / finer)
+        ceiling = np.minimum(p.safe_limit, p.repeat_limit * evidence)
+        safer = np.maximum(old, np.minimum(old + trust * evidence, ceiling))
+        worse = np.maximum(old + (weight * p.unsafe_weight) * evidence, -p.unsafe_limit)
+        new = np.where(evidence >= 0.0, safer, worse)
+        np.copyto(log_odds, new, where=seen)
+        # The memory of a fine look fades as coarser ones follow it.
+        slow = np.minimum(pixel_m, cell_pixel_m * np.float32(1.05))
+        np.copyto(cell_pixel_m, slow, where=seen)
+        np.copyto(self._seen_s[part], self._seconds(self._stamp_ns), where=seen)
+        looks = self._looks[part]
+        np.add(looks, 1, out=looks, where=seen & (looks < _LOOKS_LIMIT))
+
+    def _seconds(self, stamp_ns: int) -> float:
+        return (stamp_ns - (self._epoch_ns or 0)) * _NS
+
+    def layers(self, now_ns: int, around: tuple[float, float, float] | None = None) -> MapLayers:
+        """Return what is known now; fresh arrays.
+
+        Evidence is decayed up to now, so an old map loses its safe ground by itself.
+
+        :param around: north, east and half edge in metres of the square that matters; by default
+            the whole window. Cells outside of the window are left out (maybe all of them).
+        """
+        grid = self._grid
+        rows, columns = slice(0, self._cells), slice(0, self._cells)
+        if around is not None:
+            north_m, east_m, half_m = around
+            rows = self._span(north_m - half_m - grid.south_m, north_m + half_m - grid.south_m)
+            columns = self._span(east_m - half_m - grid.west_m, east_m + half_m - grid.west_m)
+        log_odds, looks = self._log_odds[rows, columns], self._looks[rows, columns]
+        safe_factor, unsafe_factor = self._decay((now_ns - self._stamp_ns) * _NS)
+        aged = log_odds * np.where(
+            log_odds > 0.0, np.float32(safe_factor), np.float32(unsafe_factor)
+        )
+        known = looks > 0
+        score = np.where(known, 1.0 / (1.0 + np.exp(-aged)), 0.0).astype(np.float32)
+        age = self._seconds(now_ns) - self._seen_s[rows, columns]
+        age = np.where(known, age, np.inf).astype(np.float32)
+        south_m = grid.south_m + rows.start * grid.cell_m
+        west_m = grid.west_m + columns.start * grid.cell_m
+        return MapLayers(score, age, looks.copy(), grid.cell_m, south_m, west_m)
+
+    def _span(self, low_m: float, high_m: float) -> slice:
+        cell = self.parameters.map_cell_m
+        first = min(self._cells, max(0, floor(low_m / cell)))
+        return slice(first, min(self._cells, max(first, ceil(high_m / cell))))
+
+    def score_around(
+        self, north_m: float, east_m: float, radius_m: float, now_ns: int
+    ) -> tuple[float, float]:
+        """Return the worst score (0 when any cell is unknown) and the oldest age of a disc.
+
+        Outside of the window nothing is known: (0, infinity).
+        """
+        cell = self.parameters.map_cell_m
+        layers = self.layers(now_ns, (north_m, east_m, radius_m + cell))
+        south, west = (edge // cell for edge in (north_m - radius_m, east_m - radius_m))
+        north, east = (edge // cell for edge in (north_m + radius_m, east_m + radius_m))
+        last_row, last_column = self._first_row + self._cells, self._first_column + self._cells
+        if south < self._first_row or west < self._first_column:
+            return 0.0, float('inf')
+        if north >= last_row or east >= last_column:
+            return 0.0, float('inf')
+        inside = layers.disc(north_m, east_m, max(radius_m, cell))
+        return float(layers.score[inside].min()), float(layers.age_s[inside].max())
+
+
+def _shifted(array: NDArray[_Cell], d_row: int, d_column: int, fill: float) -> NDArray[_Cell]:
+    """Return the array as seen from a window moved by whole cells."""
+    rows, columns = array.shape
+    moved = np.full_like(array, fill)
+    if abs(d_row) < rows and abs(d_column) < columns:
+        target = moved[
+            max(0, -d_row) : rows - max(0, d_row), max(0, -d_column) : columns - max(0, d_column)
+        ]
+        target[...] = array[
+            max(0, d_row) : rows - max(0, -d_row), max(0, d_column) : columns - max(0, -d_column)
+        ]
+    return moved
