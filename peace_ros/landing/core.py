@@ -143,7 +143,9 @@ class LandingCore:
 
     def _keep_time(self, now_ns: int) -> None:
         """A clock that jumps back (a simulation begun anew) makes everything known worthless."""
-        if self._last_ns is not None and now_ns < self._last_ns - round(1e9):
+        if self._last_ns is None:
+            self._since_ns = now_ns
+        elif now_ns < self._last_ns - round(1e9):
             self.safety_map.clear()
             self._intake.clear()
             self._forget_choice()

@@ -1,0 +1,83 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reaches the vehicle in the background: a silent port is waited for, and said to be silent."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Generic, Protocol, TypeVar
+
+from peace_ros.domain import VehicleError
+
+_RETRY_S = 1.0
+_JOIN_S = 1.0
+
+
+class Closable(Protocol):
+    """Anything that holds a line."""
+
+    def close(self) -> None:
+        """Release it."""
+        ...
+
+
+_Link = TypeVar('_Link', bound=Closable)
+
+
+class Connection(Generic[_Link]):
+    """Opens a link in a thread and goes on trying until it is there."""
+
+    def __init__(self, open_link: Callable[[], _Link], say: Callable[[str], None]) -> None:
+        """Begin to open.
+
+        Args:
+            open_link: Returns the link or raises VehicleError; may block for seconds.
+            say: Takes the sentence of each failure; it limits how often it repeats itself.
+
+        """
+        self._open, self._say = open_link, say
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._link: _Link | None = None
+        self._problem = 'the autopilot has not been heard yet'
+        self._thread = threading.Thread(target=self._run, name='connection', daemon=True)
+        self._thread.start()
+
+    @property
+    def link(self) -> _Link | None:
+        """The link once it is open."""
+        with self._lock:
+            return self._link
+
+    @property
+    def problem(self) -> str:
+        """Why there is no link, empty when there is one."""
+        with self._lock:
+            return self._problem
+
+    def close(self) -> None:
+        """Stop trying and close the link."""
+        with self._lock:
+            self._stop.set()
+            link, self._link = self._link, None
+        if link is not None:
+            link.close()
+        self._thread.join(timeout=_JOIN_S)
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                link = self._open()
+            except VehicleError as error:
+                with self._lock:
+                    self._problem = str(error)
+                self._say(str(error))
+                self._stop.wait(_RETRY_S)
+                continue
+            with self._lock:
+                self._problem = ''
+                if not self._stop.is_set():
+                    self._link = link
+                    return
+            link.close()

@@ -1,0 +1,183 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What each node can be told besides the parameters of the core that it runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from peace_ros.domain import Camera, ConfigurationError
+from peace_ros.domain.parameters import check, parameter
+
+_TRANSPORTS = ('raw', 'compressed')
+
+
+@dataclass(frozen=True)
+class PromptGeneratorOptions:
+    """Options of the prompt_generator node."""
+
+    image_transport: str = parameter(
+        'raw', 'Take image (raw) or image/compressed (JPEG, PNG)', choices=_TRANSPORTS
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True)
+class SegmentationOptions:
+    """Options of the segmentation node."""
+
+    image_transport: str = parameter(
+        'raw', 'Take image (raw) or image/compressed (JPEG, PNG)', choices=_TRANSPORTS
+    )
+    template: str = parameter(
+        'PEACE',
+        'That of the prompt generator; a static one (DD, D, a sentence with {term} only) is used '
+        'as it is, without prompts from a topic',
+    )
+    prompt_timeout: float = parameter(
+        0.3,
+        'A frame waits this long for the prompt made from it, then takes the newest one',
+        unit='s',
+        low=0.0,
+        high=10.0,
+    )
+    overlay_threshold: float = parameter(
+        0.5, 'Score from which the overlay shows a pixel as safe', low=0.0, high=1.0
+    )
+    overlay_quality: int = parameter(80, 'JPEG quality of the overlay', low=1, high=100)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True)
+class CameraOptions:
+    """The nadir camera, as both its simulation and the landing see it."""
+
+    camera_width: int = parameter(352, 'Width of the image', unit='px', low=16, high=8192)
+    camera_height: int = parameter(352, 'Height of the image', unit='px', low=16, high=8192)
+    camera_fov: float = parameter(
+        73.0, 'Full horizontal field of view; pixels are square', unit='deg', low=5.0, high=150.0
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    @property
+    def camera(self) -> Camera:
+        """The camera that the options describe."""
+        return Camera.from_degrees(self.camera_width, self.camera_height, self.camera_fov)
+
+
+@dataclass(frozen=True)
+class LandingOptions:
+    """Options of the landing node."""
+
+    interface: str = parameter(
+        'mavlink',
+        'mavlink commands an autopilot; twist commands the topic cmd_vel and takes the pose from '
+        'a topic, for simulators',
+        choices=('mavlink', 'twist'),
+    )
+    mavlink: str = parameter(
+        'udpin:127.0.0.1:14550',
+        'Where the autopilot is: udpin:HOST:PORT (listen), udpout:HOST:PORT (call), '
+        'tcp:HOST:PORT or /dev/NAME:BAUD',
+    )
+    dialect: str = parameter(
+        'auto', 'What kind of autopilot it is', choices=('auto', 'ardupilot', 'px4')
+    )
+    rate: float = parameter(
+        25.0, 'Rate of decisions, on the steady clock', unit='Hz', low=20.0, high=400.0
+    )
+    auto_engage: bool = parameter(
+        False, 'Engage as soon as nothing speaks against it, once; otherwise ~/engage is called'
+    )
+    pose_source: str = parameter(
+        'topic',
+        'With interface twist: pose from the topic pose (PoseStamped) or from tf',
+        choices=('topic', 'tf'),
+    )
+    tf_parent: str = parameter('map', 'Local frame (ENU) of the pose in tf')
+    tf_child: str = parameter('base_link', 'Frame of the vehicle in tf')
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True)
+class SatelliteViewOptions:
+    """Options of the satellite_view node."""
+
+    world: str = parameter(
+        '', 'Orthophoto (JPEG, PNG, GeoTIFF), north up; empty draws a world from world_seed'
+    )
+    gsd: float = parameter(
+        0.0,
+        'Ground sampling distance of the orthophoto; 0 takes it from a GeoTIFF',
+        unit='m/px',
+        low=0.0,
+        high=10.0,
+    )
+    labels: str = parameter('', 'Label raster of the orthophoto (PNG); empty when there is none')
+    world_seed: int = parameter(0, 'Seed of the drawn world', low=0, high=2**31 - 1)
+    world_size: float = parameter(400.0, 'Edge of the drawn world', unit='m', low=60.0, high=2000.0)
+    world_gsd: float = parameter(
+        0.1, 'Ground sampling distance of the drawn world', unit='m/px', low=0.05, high=2.0
+    )
+    start_x: float = parameter(
+        0.0,
+        'The local origin of the vehicle lies this far east of the centre of the world',
+        unit='m',
+        low=-1e5,
+        high=1e5,
+    )
+    start_y: float = parameter(0.0, 'The same to the north', unit='m', low=-1e5, high=1e5)
+    rate: float = parameter(10.0, 'Frames per second of the pose', unit='Hz', low=0.1, high=120.0)
+    pose_source: str = parameter(
+        'topic',
+        'Where the pose comes from: the topic ground_truth/pose, an autopilot over MAVLink, or '
+        'velocities on the topic cmd_vel that are integrated here',
+        choices=('topic', 'mavlink', 'twist'),
+    )
+    pose_mavlink: str = parameter(
+        '', 'Connection that reports the pose, written as for landing; implies pose_source mavlink'
+    )
+    start_altitude: float = parameter(
+        100.0, 'With pose_source twist: altitude at the start', unit='m', low=1.0, high=1000.0
+    )
+    twist_timeout: float = parameter(
+        1.0,
+        'With pose_source twist: the vehicle stops when no velocity came for this long',
+        unit='s',
+        low=0.05,
+        high=60.0,
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.pose_source == 'mavlink' and not self.pose_mavlink:
+            raise ConfigurationError(
+                'parameter pose_source = mavlink without pose_mavlink: say where the autopilot is'
+            )
+        if not self.world and self.labels:
+            raise ConfigurationError(
+                f'parameter labels = {self.labels!r} without world: give the orthophoto too'
+            )
+
+
+@dataclass(frozen=True)
+class AutopilotSimOptions:
+    """Options of the autopilot_sim node."""
+
+    pose_rate: float = parameter(
+        50.0, 'Rate of ground_truth/pose, simulated time', unit='Hz', low=1.0, high=200.0
+    )
+    publish_clock: bool = parameter(
+        False, 'Publish /clock also at speed 1 (at any other speed it always is)'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)

@@ -1,0 +1,115 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The prompt_generator node: ``image`` -> ``prompt``, with the stamp of the frame."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+
+from peace_ros.domain import PeaceError
+from peace_ros.inference import Bundle, ClipEncoder
+from peace_ros.nodes.inputs import ImageMessage, subscribe_images
+from peace_ros.nodes.messages import (
+    ERROR,
+    OK,
+    diagnostic_array,
+    frame_from_message,
+    prompt_to_message,
+)
+from peace_ros.nodes.options import PromptGeneratorOptions
+from peace_ros.nodes.parameters import Group
+from peace_ros.nodes.qos import RESULT
+from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.worker import NewestWorker
+from peace_ros.prompting import (
+    PromptGenerator,
+    PromptingParameters,
+    categories_of,
+    load_vocabularies,
+    resolve_template,
+)
+
+PARAMETERS: tuple[Group, ...] = (('', PromptingParameters), ('', PromptGeneratorOptions))
+
+
+def create_generator(parameters: PromptingParameters) -> PromptGenerator:
+    """Make the generator; a static template needs neither a model nor vocabularies."""
+    if not categories_of(resolve_template(parameters.template)):
+        return PromptGenerator(None, None, parameters)
+    vocabularies = load_vocabularies(parameters.vocabularies)
+    encoder = ClipEncoder(
+        Bundle.load(parameters.bundle),
+        threads=parameters.threads,
+        providers=parameters.providers,
+        cache_dir=Path(parameters.cache_dir).expanduser() if parameters.cache_dir else None,
+    )
+    return PromptGenerator(encoder, vocabularies, parameters)
+
+
+class PromptGeneratorNode(PeaceNode):
+    """Describes the newest frame in words."""
+
+    def __init__(self, generator: PromptGenerator | None = None, **options: Any) -> None:
+        """Load the model and subscribe.
+
+        Args:
+            generator: in place of the one that the parameters describe.
+            options: of rclpy's Node.
+
+        Raises:
+            PeaceError: parameters, vocabularies or bundle cannot be used.
+
+        """
+        super().__init__('prompt_generator', *PARAMETERS, **options)
+        parameters = self.filled(PromptingParameters)
+        self._generator = generator or create_generator(parameters)
+        self._last_template = ''
+        self._prompt_out = self.create_publisher(DiagnosticArray, 'prompt', RESULT)
+        self._diagnostics_out = self.create_publisher(DiagnosticArray, '/diagnostics', RESULT)
+        self._worker = NewestWorker(self._generate, self._complain, self.fail, 'prompt_generator')
+        subscribe_images(
+            self, self.filled(PromptGeneratorOptions).image_transport, self._worker.offer
+        )
+        self.get_logger().info(f'ready: template {resolve_template(parameters.template)!r}')
+
+    def _generate(self, message: ImageMessage) -> None:
+        began = time.monotonic()
+        prompt = self._generator.generate(frame_from_message(message))
+        self._prompt_out.publish(prompt_to_message(prompt))
+        if prompt.template != self._last_template:
+            self._last_template = prompt.template
+            self.get_logger().info(f'prompt: {prompt.template}')
+        latency_s = (self.clock_ns() - prompt.stamp_ns) / 1e9
+        values = (
+            ('latency_s', f'{latency_s:.3f}'),
+            ('work_s', f'{time.monotonic() - began:.3f}'),
+            ('dropped_frames', str(self._worker.dropped)),
+        )
+        self._diagnostics_out.publish(
+            diagnostic_array(prompt.stamp_ns, 'prompt_generator', OK, 'running', values)
+        )
+
+    def _complain(self, error: PeaceError) -> None:
+        self.say(type(error).__name__, f'no prompt for this frame: {error}')
+        self._diagnostics_out.publish(
+            diagnostic_array(self.clock_ns(), 'prompt_generator', ERROR, str(error), ())
+        )
+
+    def close(self) -> None:
+        """Stop the worker."""
+        self._worker.close()
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM."""
+    return run(PromptGeneratorNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

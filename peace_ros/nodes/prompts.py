@@ -1,0 +1,61 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Prompts wait here for the frames that they were made from."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+
+from peace_ros.domain import Prompt
+
+_KEPT = 64
+"""Prompts that wait; more frames than this never lie between a frame and its prompt."""
+
+
+class PromptBoard:
+    """Pairs prompts with frames by stamp; may be used from several threads."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._prompts: OrderedDict[int, Prompt] = OrderedDict()
+        self._closed = False
+
+    def put(self, prompt: Prompt) -> None:
+        """Add a prompt; the oldest ones are forgotten."""
+        with self._changed:
+            self._prompts[prompt.stamp_ns] = prompt
+            self._prompts.move_to_end(prompt.stamp_ns)
+            while len(self._prompts) > _KEPT:
+                self._prompts.popitem(last=False)
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Let everybody who waits go."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    @property
+    def is_empty(self) -> bool:
+        """No prompt has come yet."""
+        with self._changed:
+            return not self._prompts
+
+    def take(self, stamp_ns: int, timeout_s: float) -> Prompt | None:
+        """Return the prompt made from the frame of that stamp, else the newest there is.
+
+        Waits for it at most the timeout (steady clock), and not at all once a prompt of a later
+        frame is there: the generator has then passed this frame over. None before the first
+        prompt.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self._closed or self._decided(stamp_ns), timeout_s)
+            if stamp_ns in self._prompts:
+                return self._prompts[stamp_ns]
+            return next(reversed(self._prompts.values()), None)
+
+    def _decided(self, stamp_ns: int) -> bool:
+        if stamp_ns in self._prompts:
+            return True
+        return bool(self._prompts) and next(reversed(self._prompts)) > stamp_ns

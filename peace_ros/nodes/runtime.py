@@ -1,0 +1,166 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What every node shares: its base class and its main."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from types import FrameType
+from typing import Any, TypeVar
+
+import rclpy
+from rclpy.executors import (
+    ExternalShutdownException,
+    MultiThreadedExecutor,
+    SingleThreadedExecutor,
+)
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from peace_ros.domain import ConfigurationError, PeaceError
+from peace_ros.nodes.parameters import Group, declare_parameters, refuse_unknown
+
+_Parameters = TypeVar('_Parameters')
+
+EXIT_OK = 0
+EXIT_FAILED = 1
+EXIT_REFUSED = 2
+_SAY_AGAIN_S = 5.0
+_SHUTDOWN_S = 2.0
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class PeaceNode(Node):  # type: ignore[misc]
+    """A node whose parameters are dataclasses and which knows when to repeat itself."""
+
+    def __init__(self, name: str, *groups: Group, **options: Any) -> None:
+        """Create the node; refuse parameters that none of the dataclasses declares.
+
+        Raises:
+            ConfigurationError: a parameter of another type, outside its bounds or unknown.
+
+        """
+        super().__init__(name, automatically_declare_parameters_from_overrides=True, **options)
+        try:
+            refuse_unknown(self, *groups)
+            self._filled = {each: declare_parameters(self, each, group) for group, each in groups}
+        except PeaceError:
+            self.destroy_node()
+            raise
+        self.failure: Exception | None = None
+        """The defect of ours that ended a thread of this node, and with it the node."""
+        self.ended = threading.Event()
+        """Set when the node shall end by itself."""
+        self._said: dict[str, float] = {}
+        self._said_lock = threading.Lock()
+
+    def filled(self, parameters: type[_Parameters]) -> _Parameters:
+        """Return the instance of one of the parameter dataclasses."""
+        value = self._filled[parameters]
+        if not isinstance(value, parameters):
+            raise ConfigurationError(f'{parameters.__name__} is not among the parameters')
+        return value
+
+    def clock_ns(self) -> int:
+        """Return the node clock in nanoseconds (simulated with use_sim_time)."""
+        return int(self.get_clock().now().nanoseconds)
+
+    def say(self, subject: str, sentence: str) -> None:
+        """Log a warning, at most every few seconds of the steady clock for one subject."""
+        now = time.monotonic()
+        with self._said_lock:
+            if now - self._said.get(subject, -_SAY_AGAIN_S) < _SAY_AGAIN_S:
+                return
+            self._said[subject] = now
+        self.get_logger().warning(sentence)
+
+    def fail(self, error: Exception) -> None:
+        """Remember a defect of ours and end the process in an orderly way; see :func:`run`."""
+        self.failure = self.failure or error
+        self.ended.set()
+
+    def close(self) -> None:
+        """Stop threads and links; the node itself is destroyed by :func:`run`."""
+
+
+class _Interrupted(BaseException):
+    """SIGINT or SIGTERM; no Exception, so that nothing but :func:`run` catches it."""
+
+
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
+    raise _Interrupted
+
+
+def run(
+    create: Callable[[], PeaceNode], args: Sequence[str] | None = None, threads: int = 1
+) -> int:
+    """Create a node, spin it until SIGINT or SIGTERM, close it; return the exit status.
+
+    0 after a signal; 2 with one sentence on standard error when the arguments, the
+    configuration, a model, a world or the vehicle cannot be used; 1 with a traceback for a
+    defect of ours. rclpy's own signal handlers would take the context away from under nodes that
+    still have something to say, so they are not installed.
+    """
+    for number in _SIGNALS:
+        signal.signal(number, _interrupt)
+    node: PeaceNode | None = None
+    try:
+        rclpy.init(
+            args=None if args is None else list(args),
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        node = create()
+        _spin_until_ended(node, threads)
+    except _Interrupted:
+        return EXIT_OK
+    except PeaceError as error:
+        return _refused(error)
+    except RuntimeError as error:
+        if rclpy.ok():
+            raise
+        return _refused(error)  # what rclpy.init says of arguments or a broken --params-file
+    finally:
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    if node.failure is not None:
+        traceback.print_exception(node.failure)
+        return EXIT_FAILED
+    return EXIT_OK
+
+
+def _spin_until_ended(node: PeaceNode, threads: int) -> None:
+    """Spin in a thread, because Python runs signal handlers only while its main thread is free."""
+    executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
+    executor.add_node(node)
+
+    def spin() -> None:
+        try:
+            executor.spin()
+        except ExternalShutdownException:
+            node.ended.set()
+        except Exception as error:
+            node.fail(error)
+
+    spinner = threading.Thread(target=spin, name='spin', daemon=True)
+    spinner.start()
+    try:
+        node.ended.wait()
+    finally:
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+        executor.shutdown(timeout_sec=_SHUTDOWN_S)
+        spinner.join(timeout=_SHUTDOWN_S)
+        node.close()
+
+
+def _refused(error: Exception) -> int:
+    print(error, file=sys.stderr, flush=True)
+    return EXIT_REFUSED

@@ -1,0 +1,82 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A vehicle that is a pose topic and a velocity topic: what simulators without MAVLink offer."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from math import isfinite
+
+from geometry_msgs.msg import Twist
+
+from peace_ros.domain import Pose, Setpoint, Telemetry, VehicleError
+from peace_ros.nodes.messages import setpoint_to_body_twist
+from peace_ros.vehicle import Answer, RequestResult
+
+_POSES = 256
+
+
+class TwistLink:
+    """A VehicleLink that always obeys: there is no pilot and no mode in such a simulator."""
+
+    def __init__(self, publish: Callable[[Twist], None]) -> None:
+        self._publish = publish
+        self._lock = threading.Lock()
+        self._poses: deque[Pose] = deque(maxlen=_POSES)
+        self._newest: Pose | None = None
+        self._received_ns = 0
+
+    def add_pose(self, pose: Pose) -> None:
+        """Take a pose that came over a topic."""
+        with self._lock:
+            self._poses.append(pose)
+            self._newest, self._received_ns = pose, time.monotonic_ns()
+
+    @property
+    def taken_over(self) -> bool:
+        """Nobody else commands."""
+        return False
+
+    def telemetry(self) -> Telemetry:
+        """Return the newest pose as telemetry of an armed, obedient, flying vehicle."""
+        with self._lock:
+            return Telemetry(
+                self._received_ns,
+                self._newest,
+                armed=True,
+                in_control=True,
+                mode='TWIST',
+                landed=False,
+            )
+
+    def take_poses(self) -> list[Pose]:
+        """Return the poses since the last call, oldest first."""
+        with self._lock:
+            poses = list(self._poses)
+            self._poses.clear()
+            return poses
+
+    def send_velocity(self, setpoint: Setpoint) -> None:
+        """Publish the set-point along the axes of the image; without a pose only zero goes out."""
+        v = (setpoint.v_north_m_s, setpoint.v_east_m_s, setpoint.v_down_m_s)
+        if not all(map(isfinite, v)):
+            raise VehicleError(f'velocity set-point {v} m/s: all components must be finite')
+        with self._lock:
+            pose = self._newest
+        self._publish(Twist() if pose is None else setpoint_to_body_twist(setpoint, pose))
+
+    def request_control(self, *, by_person: bool = False) -> RequestResult:  # noqa: ARG002
+        """Accept: there is nobody to ask."""
+        return RequestResult(Answer.ACCEPTED)
+
+    def request_hold(self) -> RequestResult:
+        """Stop; the simulator holds by itself."""
+        self._publish(Twist())
+        return RequestResult(Answer.ACCEPTED)
+
+    def close(self) -> None:
+        """Stop the vehicle."""
+        self._publish(Twist())

@@ -1,0 +1,121 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""ROS in the test process: a domain of its own, peers that collect, waiting on predicates."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from peace_ros.nodes.messages import image_message
+from peace_ros.nodes.runtime import PeaceNode
+
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+os.environ['ROS_DOMAIN_ID'] = str(1 + os.getpid() % 100)
+
+WAIT_S = 20.0
+
+
+@pytest.fixture(scope='session', autouse=True)
+def ros() -> Iterator[None]:
+    rclpy.init(args=[], signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
+    yield
+    rclpy.try_shutdown()
+
+
+class Bench:
+    """Spins the node under test and a peer; what comes on topics is kept in lists."""
+
+    def __init__(self) -> None:
+        self.peer = Node('peer')
+        self._executors = []
+        self._threads = []
+        self._nodes: list[PeaceNode] = []
+        self._spin(self.peer)
+
+    def _spin(self, node: Any) -> None:
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        thread = threading.Thread(target=executor.spin, daemon=True)
+        thread.start()
+        self._executors.append(executor)
+        self._threads.append(thread)
+
+    def run(self, create: Callable[..., PeaceNode], *given: Any, **parameters: Any) -> PeaceNode:
+        node = create(*given, parameter_overrides=overrides(**parameters))
+        self._nodes.append(node)
+        self._spin(node)
+        return node
+
+    def heard(self, kind: Any, topic: str, profile: Any) -> list[Any]:
+        messages: list[Any] = []
+
+        def keep(message: Any) -> None:
+            messages.append(message)
+
+        self.peer.create_subscription(kind, topic, keep, profile)
+        return messages
+
+    def offer(self, kind: Any, topic: str, profile: Any) -> Any:
+        """Return a publisher once the node under test listens."""
+        publisher = self.peer.create_publisher(kind, topic, profile)
+        self.until(lambda: publisher.get_subscription_count() > 0)
+        return publisher
+
+    def until(self, predicate: Callable[[], bool], doing: Callable[[], None] | None = None) -> None:
+        """Wait for a predicate; ``doing`` is repeated at 20 Hz meanwhile."""
+        deadline = time.monotonic() + WAIT_S
+        while not predicate():
+            assert time.monotonic() < deadline, 'did not happen in time'
+            for node in self._nodes:
+                if node.failure is not None:
+                    raise node.failure
+            if doing is not None:
+                doing()
+            time.sleep(0.05 if doing is not None else 0.005)
+
+    def close(self) -> None:
+        for executor, thread in zip(self._executors, self._threads, strict=True):
+            executor.shutdown()
+            thread.join(5.0)
+        for node in self._nodes:
+            node.close()
+            node.destroy_node()
+        self.peer.destroy_node()
+
+
+def overrides(**parameters: Any) -> list[Any]:
+    return [Parameter(name.replace('__', '.'), value=value) for name, value in parameters.items()]
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    bench = Bench()
+    yield bench
+    bench.close()
+
+
+@pytest.fixture
+def picture() -> Callable[[int], Any]:
+    def make(at_ns: int, width: int = 64, height: int = 48) -> Any:
+        pixels = np.zeros((height, width, 3), np.uint8)
+        pixels[..., 1] = 120
+        return image_message(pixels, 'rgb8', at_ns)
+
+    return make
+
+
+@pytest.fixture
+def values_of() -> Callable[[DiagnosticArray], dict[str, str]]:
+    return lambda message: {each.key: each.value for each in message.status[0].values}

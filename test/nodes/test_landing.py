@@ -1,0 +1,186 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The landing node stands still without data, engages only in the air, and never insists."""
+
+from __future__ import annotations
+
+import socket
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PointStamped, PoseStamped, Twist, TwistStamped
+from sensor_msgs.msg import Image
+from std_srvs.srv import Trigger
+
+from peace_ros.domain import ConfigurationError, Heatmap, Pose, Telemetry
+from peace_ros.landing import LandingParameters, State
+from peace_ros.nodes import qos
+from peace_ros.nodes.engagement import reason_against
+from peace_ros.nodes.landing import LandingNode
+from peace_ros.nodes.messages import heatmap_to_image, pose_to_message
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+
+
+class Flight:
+    """A simulator of one pose and one picture, both repeated; it ignores velocities."""
+
+    def __init__(self, bench, node, safety=0.97):
+        self.node = node
+        self.poses = bench.offer(PoseStamped, 'pose', qos.POSE)
+        self.heatmaps = bench.offer(Image, 'heatmap', qos.IMAGE_OUT)
+        self.safety = np.full((88, 88), safety, np.float32)
+        self.altitude_m = 100.0
+        self.has_heatmaps = True
+
+    def __call__(self):
+        at_ns = self.node.clock_ns()
+        pose = Pose(at_ns, 0.0, 0.0, -self.altitude_m, LEVEL, self.altitude_m)
+        self.poses.publish(pose_to_message(pose))
+        if self.has_heatmaps:
+            self.heatmaps.publish(heatmap_to_image(Heatmap(self.safety, at_ns)))
+
+
+def call(bench, name, doing=None):
+    client = bench.peer.create_client(Trigger, f'/landing/{name}')
+    bench.until(client.service_is_ready, doing)
+    future = client.call_async(Trigger.Request())
+    bench.until(future.done, doing)
+    return future.result()
+
+
+def listen(bench):
+    return bench.heard(DiagnosticArray, 'landing/status', qos.RESULT)
+
+
+def state_of(statuses, values_of):
+    return values_of(statuses[-1])['state'] if statuses else ''
+
+
+def silent_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+def test_a_silent_port_is_a_hold_with_a_reason_and_nothing_engages(bench, values_of):
+    statuses = listen(bench)
+    port = silent_port()
+    bench.run(LandingNode, mavlink=f'udpin:127.0.0.1:{port}', vehicle__connect_timeout_s=0.2)
+    bench.until(lambda: bool(statuses) and 'HEARTBEAT' in statuses[-1].status[0].message)
+    values = values_of(statuses[-1])
+    assert values['state'] == 'HOLD'
+    assert f'udpin:127.0.0.1:{port}' in values['reason']
+    answer = call(bench, 'engage')
+    assert not answer.success
+    assert 'HEARTBEAT' in answer.message
+
+
+def test_a_wrong_url_is_a_hold_with_a_reason(bench, values_of):
+    statuses = listen(bench)
+    bench.run(LandingNode, mavlink='nonsense')
+    bench.until(lambda: bool(statuses) and "'nonsense'" in statuses[-1].status[0].message)
+    assert state_of(statuses, values_of) == 'HOLD'
+
+
+def test_refuses_to_engage_without_telemetry_and_without_heatmaps(bench):
+    node = bench.run(LandingNode, interface='twist')
+    assert 'no telemetry' in call(bench, 'engage').message
+    flight = Flight(bench, node)
+    flight.has_heatmaps = False
+    for _ in range(3):
+        flight()
+    messages = []
+
+    def ask():
+        flight()
+        messages.append(call(bench, 'engage', flight).message)
+
+    bench.until(lambda: any('no heatmap yet' in each for each in messages), ask)
+
+
+def test_lands_by_twist_once_engaged_and_stops_when_disengaged(bench, values_of):
+    statuses = listen(bench)
+    setpoints = bench.heard(TwistStamped, 'landing/setpoint', qos.RESULT)
+    sites = bench.heard(PointStamped, 'landing/site', qos.RESULT)
+    commands = bench.heard(Twist, 'cmd_vel', qos.COMMAND)
+    node = bench.run(LandingNode, interface='twist')
+    flight = Flight(bench, node)
+    bench.until(lambda: state_of(statuses, values_of) == 'IDLE' and bool(sites), flight)
+    assert not commands
+    assert not setpoints
+    bench.until(lambda: call(bench, 'engage', flight).success, flight)
+    bench.until(lambda: any(each.linear.z < -0.3 for each in commands), flight)
+    assert state_of(statuses, values_of) in {'AIMING', 'LANDING'}
+    assert float(values_of(statuses[-1])['altitude_agl_m']) == pytest.approx(100.0)
+    assert any(each.twist.linear.z < -0.3 for each in setpoints)
+    assert not call(bench, 'engage', flight).success
+    assert call(bench, 'disengage', flight).success
+    commands.clear()
+    bench.until(lambda: len(commands) > 4 and state_of(statuses, values_of) == 'IDLE', flight)
+    assert all(each.linear.z == 0.0 for each in commands[2:])
+
+
+def test_holds_with_zero_velocity_when_the_heatmaps_stop(bench, values_of):
+    statuses = listen(bench)
+    commands = bench.heard(Twist, 'cmd_vel', qos.COMMAND)
+    node = bench.run(
+        LandingNode,
+        interface='twist',
+        heatmap_age_limit_s=0.6,
+        descent_heatmap_age_limit_s=0.5,
+    )
+    flight = Flight(bench, node)
+    bench.until(lambda: call(bench, 'engage', flight).success, flight)
+    bench.until(lambda: any(each.linear.z < -0.3 for each in commands), flight)
+    flight.has_heatmaps = False
+    bench.until(lambda: state_of(statuses, values_of) == 'HOLD', flight)
+    assert 'heatmap' in values_of(statuses[-1])['reason']
+    commands.clear()
+    bench.until(lambda: len(commands) > 5, flight)
+    still = [(each.linear.x, each.linear.y, each.linear.z) for each in commands[1:]]
+    assert set(still) == {(0.0, 0.0, 0.0)}
+
+
+def test_engages_by_itself_only_when_told_so(bench, values_of):
+    statuses = listen(bench)
+    node = bench.run(LandingNode, interface='twist', auto_engage=True)
+    flight = Flight(bench, node)
+    bench.until(lambda: state_of(statuses, values_of) in {'SEARCHING', 'AIMING'}, flight)
+
+
+def test_tf_needs_the_package_that_the_wheels_lack(bench):
+    pytest.importorskip('rclpy')
+    try:
+        import tf2_msgs  # noqa: F401
+    except ImportError:
+        with pytest.raises(ConfigurationError, match='tf2_msgs'):
+            bench.run(LandingNode, interface='twist', pose_source='tf')
+
+
+POSE = Pose(0, 0.0, 0.0, -100.0, LEVEL, 100.0)
+FLYING = {'pose': POSE, 'armed': True, 'landed': False}
+
+
+@pytest.mark.parametrize(
+    ('state', 'told', 'telemetry_age_s', 'map_age_s', 'word'),
+    [
+        (State.LANDING, FLYING, 0.0, 0.0, 'under way'),
+        (State.IDLE, None, 0.0, 0.0, 'no telemetry'),
+        (State.IDLE, {**FLYING, 'pose': None}, 0.0, 0.0, 'no telemetry'),
+        (State.IDLE, FLYING, 5.0, 0.0, '5.0 s old'),
+        (State.IDLE, FLYING, float('nan'), 0.0, 'old'),
+        (State.IDLE, {**FLYING, 'armed': False}, 0.0, 0.0, 'not armed'),
+        (State.IDLE, {**FLYING, 'landed': True}, 0.0, 0.0, 'on the ground'),
+        (State.IDLE, FLYING, 0.0, float('inf'), 'no heatmap yet'),
+        (State.IDLE, FLYING, 0.0, 9.0, '9.0 s old'),
+        (State.IDLE, FLYING, 0.0, 0.0, ''),
+        (State.ABORTED, FLYING, 0.0, 0.0, ''),
+    ],
+)
+def test_says_what_speaks_against_a_landing(state, told, telemetry_age_s, map_age_s, word):
+    telemetry = None if told is None else Telemetry(1, **told)
+    reason = reason_against(state, telemetry, telemetry_age_s, map_age_s, LandingParameters())
+    assert word in reason
+    assert bool(reason) == bool(word)

@@ -1,0 +1,164 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters: declared once, refused in one sentence, equal in code, YAML and documentation."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import yaml
+from rclpy.parameter import Parameter
+
+from peace_ros.domain import ConfigurationError
+from peace_ros.domain.parameters import check, parameter
+from peace_ros.nodes.parameter_docs import (
+    NODE_PARAMETERS,
+    allowed,
+    defaults_yaml,
+    markdown,
+    named,
+)
+from peace_ros.nodes.runtime import PeaceNode
+
+ROOT = Path(__file__).resolve().parents[2]
+PRESETS = ROOT / 'config' / 'presets'
+
+
+@dataclass(frozen=True)
+class Sample:
+    speed: float = parameter(1.5, 'Speed over ground', unit='m/s', low=0.0, high=5.0)
+    count: int = parameter(3, 'How many', low=1)
+    name: str = parameter('a', 'Which one', choices=('a', 'b'))
+    active: bool = parameter(default=False, description='Whether')
+    providers: tuple[str, ...] = parameter(('x', 'y'), 'In order')
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+def node_with(**values: object) -> PeaceNode:
+    given = [Parameter(name.replace('__', '.'), value=value) for name, value in values.items()]
+    return PeaceNode('sample', ('', Sample), ('group', Sample), parameter_overrides=given)
+
+
+def test_defaults_bounds_and_meaning_reach_ros():
+    node = node_with()
+    descriptor = node.describe_parameter('group.speed')
+    assert node.filled(Sample) == Sample()
+    assert node.get_parameter('providers').value == ['x', 'y']
+    assert descriptor.description == 'Speed over ground [m/s]'
+    assert descriptor.read_only
+    assert descriptor.floating_point_range[0].to_value == 5.0
+    assert node.describe_parameter('count').integer_range[0].from_value == 1
+    assert 'a, b' in node.describe_parameter('name').additional_constraints
+    node.destroy_node()
+
+
+def test_a_given_value_arrives_and_a_whole_number_serves_as_a_float():
+    node = node_with(group__speed=2, group__providers=['z'], group__active=True)
+    assert node.filled(Sample) == Sample(speed=2.0, providers=('z',), active=True)
+    assert node.get_parameter('group.speed').value == 2.0
+    node.destroy_node()
+
+
+def test_no_parameter_can_be_changed_in_flight():
+    node = node_with()
+    (result,) = node.set_parameters([Parameter('speed', value=2.0)])
+    assert not result.successful
+    node.destroy_node()
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        ({'speed': 7.0}, ['speed = 7.0 m/s', '5']),
+        ({'speed': float('nan')}, ['speed = nan']),
+        ({'speed': 'fast'}, ["speed = 'fast'", 'a number', '1.5']),
+        ({'count': 0}, ['count = 0', '1']),
+        ({'count': 2.5}, ['count = 2.5', 'whole number']),
+        ({'count': True}, ['count = True']),
+        ({'name': 'c'}, ["name = 'c'", 'a, b']),
+        ({'active': 1}, ['active = 1', 'true or false']),
+        ({'providers': 'x'}, ["providers = 'x'", 'a list']),
+        ({'providers': [1, 2]}, ['providers', 'a list']),
+        ({'sped': 1.0}, ['sped of sample is unknown', 'speed']),
+        ({'group__cuont': 1}, ['group.cuont', 'did you mean group.count?']),
+    ],
+)
+def test_a_bad_value_is_refused_in_one_sentence(values, words):
+    with pytest.raises(ConfigurationError) as caught:
+        node_with(**values)
+    assert all(word in str(caught.value) for word in words)
+    assert '\n' not in str(caught.value)
+
+
+def test_parameters_of_ros_itself_are_known():
+    node = node_with(use_sim_time=False, **{'qos_overrides./image.subscription.depth': 1})
+    node.destroy_node()
+
+
+def flat(section: dict, prefix: str = '') -> dict:
+    found = {}
+    for name, value in section.items():
+        if isinstance(value, dict):
+            found.update(flat(value, f'{prefix}{name}.'))
+        else:
+            found[prefix + name] = value
+    return found
+
+
+@pytest.mark.parametrize('node', sorted(NODE_PARAMETERS))
+def test_code_yaml_and_documentation_agree(node):
+    defaults = {name: info.default for name, info in named(NODE_PARAMETERS[node])}
+    plain = {
+        name: list(value) if isinstance(value, tuple) else value for name, value in defaults.items()
+    }
+    shipped = yaml.safe_load((ROOT / 'config' / 'defaults.yaml').read_text())
+    written = flat(shipped[node]['ros__parameters'])
+    assert written == plain
+    assert {name: type(value) for name, value in written.items()} == {
+        name: type(value) for name, value in plain.items()
+    }
+    text = (ROOT / 'docs' / 'parameters.md').read_text()
+    table = re.split(r'^## ', text, flags=re.MULTILINE)
+    (section,) = [part for part in table if part.startswith(f'{node}\n')]
+    rows = [line.split(' | ') for line in section.splitlines() if line.startswith('| `')]
+    documented = {row[0].strip('|` '): yaml.safe_load(row[1].strip('`')) for row in rows}
+    assert documented == plain
+
+
+def test_generated_files_are_fresh():
+    assert (ROOT / 'docs' / 'parameters.md').read_text() == markdown()
+    assert (ROOT / 'config' / 'defaults.yaml').read_text() == defaults_yaml()
+
+
+def test_no_name_is_declared_twice_on_a_node():
+    for groups in NODE_PARAMETERS.values():
+        names = [name for name, _ in named(groups)]
+        assert len(names) == len(set(names))
+
+
+def test_every_number_has_bounds():
+    for node, groups in NODE_PARAMETERS.items():
+        for name, info in named(groups):
+            if isinstance(info.default, int | float) and not isinstance(info.default, bool):
+                assert allowed(info), f'{node}.{name}'
+
+
+def test_presets_are_the_six_of_the_paper_and_their_values_exist():
+    names = {path.stem for path in PRESETS.glob('*.yaml')}
+    assert names == {
+        f'{prompt}_{model}' for prompt in ('dd', 'd', 'peace') for model in ('cs', 'fs')
+    }
+    for path in PRESETS.glob('*.yaml'):
+        for node, section in yaml.safe_load(path.read_text()).items():
+            known = dict(named(NODE_PARAMETERS[node]))
+            for name, value in section['ros__parameters'].items():
+                assert type(value) is type(known[name].default), f'{path.name}: {node}.{name}'
+            prompt, model = path.stem.split('_')
+            assert section['ros__parameters']['template'] == prompt.upper()
+        family = yaml.safe_load(path.read_text())['segmentation']['ros__parameters']['family']
+        assert family == {'cs': 'clipseg', 'fs': 'fastsam'}[model]

@@ -1,0 +1,66 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A frame gets the prompt made from it, and waits for it only as long as it may."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from peace_ros.domain import Prompt
+from peace_ros.nodes.prompts import PromptBoard
+
+
+def prompt(stamp_ns: int) -> Prompt:
+    return Prompt(f'{{term}} {stamp_ns}', stamp_ns)
+
+
+def test_pairs_by_stamp_even_when_newer_prompts_are_there():
+    board = PromptBoard()
+    for stamp_ns in (1, 2, 3):
+        board.put(prompt(stamp_ns))
+    assert board.take(2, 0.0) == prompt(2)
+
+
+def test_nothing_before_the_first_prompt():
+    board = PromptBoard()
+    assert board.is_empty
+    assert board.take(1, 0.01) is None
+
+
+def test_waits_for_its_prompt_as_long_as_it_takes_within_the_limit():
+    board = PromptBoard()
+    board.put(prompt(1))
+    threading.Timer(0.05, lambda: board.put(prompt(2))).start()
+    assert board.take(2, 10.0) == prompt(2)
+
+
+def test_takes_the_newest_when_the_time_is_over():
+    board = PromptBoard()
+    board.put(prompt(1))
+    begun = time.monotonic()
+    assert board.take(5, 0.05) == prompt(1)
+    assert 0.04 <= time.monotonic() - begun < 2.0
+
+
+def test_does_not_wait_for_a_frame_that_was_passed_over():
+    board = PromptBoard()
+    board.put(prompt(9))
+    begun = time.monotonic()
+    assert board.take(5, 10.0) == prompt(9)
+    assert time.monotonic() - begun < 5.0
+
+
+def test_forgets_old_prompts():
+    board = PromptBoard()
+    for stamp_ns in range(1000):
+        board.put(prompt(stamp_ns))
+    assert board.take(0, 0.0) == prompt(999)
+
+
+def test_closing_lets_who_waits_go():
+    board = PromptBoard()
+    threading.Timer(0.05, board.close).start()
+    begun = time.monotonic()
+    assert board.take(1, 30.0) is None
+    assert time.monotonic() - begun < 10.0

@@ -1,0 +1,67 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes as processes: they end quietly on a signal and with one sentence on a bad value."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def start(node: str, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, '-m', f'peace_ros.nodes.{node}', '--ros-args', *arguments],
+        cwd=ROOT,
+        env={**os.environ, 'PYTHONUNBUFFERED': '1'},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_ends_quietly_on_a_signal(number):
+    with start('prompt_generator', '-p', 'template:=DD') as process:
+        assert process.stdout is not None
+        assert 'ready' in process.stdout.readline()
+        process.send_signal(number)
+        rest = process.stdout.read()
+        assert process.wait(20) == 0
+    assert 'Traceback' not in rest
+
+
+@pytest.mark.parametrize(
+    ('node', 'arguments', 'words'),
+    [
+        ('segmentation', ('-p', 'threads:=0'), 'threads = 0: must lie between 1 and 64'),
+        (
+            'segmentation',
+            ('--params-file', str(ROOT / 'config' / 'presets' / 'peace_fs.yaml')),
+            'fastsam',
+        ),
+        ('prompt_generator', ('--params-file', '/no/such.yaml'), '/no/such.yaml'),
+    ],
+)
+def test_a_bad_value_ends_in_one_sentence_and_status_2(node, arguments, words):
+    with start(node, *arguments) as process:
+        output, _ = process.communicate(timeout=30)
+    assert process.returncode == 2
+    assert words in output
+    assert 'Traceback' not in output
+
+
+def test_the_shipped_defaults_are_taken_by_a_node():
+    defaults = str(ROOT / 'config' / 'defaults.yaml')
+    with start('autopilot_sim', '--params-file', defaults, '-p', 'port:=0') as process:
+        assert process.stdout is not None
+        assert 'ready' in process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        process.stdout.read()
+        assert process.wait(20) == 0

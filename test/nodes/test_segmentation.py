@@ -1,0 +1,166 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Heatmaps carry the stamp and the prompt of their frame; slowness loses frames, not time."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import CompressedImage, Image
+
+from peace_ros.domain import Heatmap, Prompt
+from peace_ros.nodes import qos
+from peace_ros.nodes.messages import (
+    frame_from_message,
+    heatmap_from_image,
+    prompt_to_message,
+    stamp_ns,
+)
+from peace_ros.nodes.segmentation import SegmentationNode
+
+
+class Painter:
+    """Notes what it is given; waits until it may answer."""
+
+    def __init__(self, seconds: float = 0.0) -> None:
+        self.seen: list[tuple[int, Prompt]] = []
+        self.prepared: list[str] = []
+        self.may_prepare = threading.Event()
+        self.may_prepare.set()
+        self.unknown_terms: dict[str, tuple[str, ...]] = {}
+        self._seconds = seconds
+
+    def prepare(self, prompt):
+        self.may_prepare.wait(20.0)
+        self.prepared.append(prompt.template)
+
+    def segment(self, frame, prompt):
+        time.sleep(self._seconds)
+        self.seen.append((frame.stamp_ns, prompt))
+        return Heatmap(np.full((6, 8), 0.8, np.float32), frame.stamp_ns)
+
+
+def prompt(at_ns: int, word: str = 'winter') -> DiagnosticArray:
+    return prompt_to_message(Prompt(f'A {{term}} in {word}.', at_ns))
+
+
+def test_the_heatmap_carries_the_stamp_of_the_frame(bench, picture):
+    heatmaps = bench.heard(Image, 'heatmap', qos.IMAGE_IN)
+    bench.run(SegmentationNode, Painter(), template='DD')
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    bench.until(lambda: bool(heatmaps), lambda: images.publish(picture(987_654_321_012)))
+    heatmap = heatmap_from_image(heatmaps[0])
+    assert heatmap.stamp_ns == 987_654_321_012
+    assert heatmap.safety.shape == (6, 8)
+    assert abs(heatmap.safety - 0.8).max() < 0.003
+
+
+def test_nothing_before_the_first_prompt_then_each_frame_with_its_own(bench, picture):
+    painter = Painter()
+    heatmaps = bench.heard(Image, 'heatmap', qos.IMAGE_IN)
+    bench.run(SegmentationNode, painter, prompt_timeout=10.0)
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    prompts = bench.offer(DiagnosticArray, 'prompt', qos.RESULT)
+    for at_ns in range(1, 6):
+        images.publish(picture(at_ns))
+    prompts.publish(prompt(5, 'spring'))
+    bench.until(lambda: bool(painter.prepared))
+    assert not painter.seen
+    images.publish(picture(20))
+    prompts.publish(prompt(20, 'autumn'))
+    bench.until(lambda: len(heatmaps) == 1)
+    assert [(at_ns, each.template) for at_ns, each in painter.seen] == [(20, 'A {term} in autumn.')]
+    assert painter.seen[0][1].stamp_ns == 20
+
+
+def test_says_when_it_takes_an_older_prompt(bench, picture, values_of):
+    painter = Painter()
+    diagnostics = bench.heard(DiagnosticArray, '/diagnostics', qos.RESULT)
+    bench.run(SegmentationNode, painter, prompt_timeout=0.05)
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    prompts = bench.offer(DiagnosticArray, 'prompt', qos.RESULT)
+    prompts.publish(prompt(1))
+    bench.until(lambda: bool(painter.prepared))
+    late = picture(2_500_000_001)
+    bench.until(lambda: bool(diagnostics), lambda: images.publish(late))
+    assert painter.seen[0][1].stamp_ns == 1
+    assert '0.05 s' in diagnostics[0].status[0].message
+    assert '2.50 s before' in diagnostics[0].status[0].message
+    assert values_of(diagnostics[0])['own_prompt'] == 'false'
+
+
+def test_a_new_sentence_does_not_stall_the_frames(bench, picture):
+    painter = Painter()
+    bench.run(SegmentationNode, painter, prompt_timeout=0.05)
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    prompts = bench.offer(DiagnosticArray, 'prompt', qos.RESULT)
+    prompts.publish(prompt(1, 'winter'))
+    bench.until(lambda: painter.prepared == ['A {term} in winter.'])
+    painter.may_prepare.clear()
+    prompts.publish(prompt(2, 'summer'))
+    bench.until(lambda: bool(painter.seen), lambda: images.publish(picture(2)))
+    assert painter.seen[0][1].template == 'A {term} in winter.'
+    painter.may_prepare.set()
+    bench.until(
+        lambda: painter.seen[-1][1].template == 'A {term} in summer.',
+        lambda: images.publish(picture(2)),
+    )
+
+
+def test_a_slow_segmenter_loses_frames_and_never_gathers_latency(bench, picture, values_of):
+    painter = Painter(seconds=0.2)
+    heatmaps = bench.heard(Image, 'heatmap', qos.IMAGE_IN)
+    diagnostics = bench.heard(DiagnosticArray, '/diagnostics', qos.RESULT)
+    node = bench.run(SegmentationNode, painter, template='D')
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    published = []
+
+    def stream():
+        at_ns = node.clock_ns()
+        published.append(at_ns)
+        images.publish(picture(at_ns))
+
+    bench.until(lambda: len(diagnostics) >= 5, stream)
+    assert len(heatmaps) < len(published)
+    assert int(values_of(diagnostics[-1])['dropped_frames']) > 0
+    latencies = [float(values_of(each)['latency_s']) for each in diagnostics]
+    # Two times the work and some room for a busy machine; a queue of all frames would exceed it.
+    assert latencies[-1] < 0.2 * 2 + 0.4
+    stamps = [stamp_ns(each) for each in heatmaps]
+    assert stamps == sorted(stamps)
+
+
+def test_an_overlay_is_drawn_only_for_those_who_look(bench, picture):
+    bench.run(SegmentationNode, Painter(), template='DD')
+    overlays = bench.heard(CompressedImage, 'overlay/compressed', qos.IMAGE_IN)
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    bench.until(lambda: bool(overlays), lambda: images.publish(picture(3)))
+    overlay = frame_from_message(overlays[0])
+    assert overlay.image_rgb.shape == (48, 64, 3)
+    assert overlay.stamp_ns == 3
+
+
+def test_a_garbage_image_leaves_the_node_alive_and_says_why(bench, picture):
+    heatmaps = bench.heard(Image, 'heatmap', qos.IMAGE_IN)
+    diagnostics = bench.heard(DiagnosticArray, '/diagnostics', qos.RESULT)
+    bench.run(SegmentationNode, Painter(), template='DD')
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    garbage = picture(1)
+    garbage.step = 5
+    bench.until(
+        lambda: any('step 5' in each.status[0].message for each in diagnostics),
+        lambda: images.publish(garbage),
+    )
+    assert not heatmaps
+    bench.until(lambda: bool(heatmaps), lambda: images.publish(picture(9)))
+
+
+def test_a_garbage_prompt_is_said(bench):
+    diagnostics = bench.heard(DiagnosticArray, '/diagnostics', qos.RESULT)
+    bench.run(SegmentationNode, Painter())
+    prompts = bench.offer(DiagnosticArray, 'prompt', qos.RESULT)
+    bench.until(lambda: bool(diagnostics), lambda: prompts.publish(DiagnosticArray()))
+    assert 'template' in diagnostics[0].status[0].message
