@@ -1,0 +1,244 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``peace``: the command line for people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import typer
+
+from peace_ros import __version__
+from peace_ros.domain import ConfigurationError, PeaceError
+
+EXIT_FAILED, EXIT_REFUSED, EXIT_INTERRUPTED = 1, 2, 130
+
+app = typer.Typer(
+    name='peace',
+    help='Find a place below a drone where landing hurts nobody, and go there.',
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+models_app = typer.Typer(help='Look at model bundles.', no_args_is_help=True)
+app.add_typer(models_app, name='models')
+
+_Verb = TypeVar('_Verb', bound=Callable[..., Any])
+
+
+def _in_one_sentence(verb: _Verb) -> _Verb:
+    """Turn a PeaceError into one sentence on standard error and an exit status.
+
+    2 for what the user gave and can change, 1 for what failed on the way.
+    """
+
+    @wraps(verb)
+    def run(*arguments: Any, **options: Any) -> Any:
+        try:
+            return verb(*arguments, **options)
+        except PeaceError as error:
+            typer.echo(f'peace: {error}', err=True)
+            raise typer.Exit(_status_of(error)) from None
+        except KeyboardInterrupt:
+            typer.echo('peace: interrupted', err=True)
+            raise typer.Exit(EXIT_INTERRUPTED) from None
+
+    return run  # type: ignore[return-value]
+
+
+def _status_of(error: PeaceError) -> int:
+    from peace_ros.domain import BundleError, RecordingError, WorldError
+
+    refused = (ConfigurationError, BundleError, RecordingError, WorldError)
+    return EXIT_REFUSED if isinstance(error, refused) else EXIT_FAILED
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f'peace_ros {__version__}')
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    _version: Annotated[
+        bool,
+        typer.Option(
+            '--version', callback=_show_version, is_eager=True, help='Show the version and exit.'
+        ),
+    ] = False,
+) -> None:
+    """Find a place below a drone where landing hurts nobody, and go there."""
+
+
+@app.command()
+@_in_one_sentence
+def demo(
+    *,
+    world: Annotated[
+        Path | None,
+        typer.Option(help='Orthophoto (JPEG, PNG, GeoTIFF); without it a world is drawn.'),
+    ] = None,
+    gsd: Annotated[
+        float | None,
+        typer.Option(metavar='M', help='Metres of ground per pixel of --world.'),
+    ] = None,
+    labels: Annotated[
+        Path | None,
+        typer.Option(
+            help='Label raster of --world; <name>_label.png beside it is found by itself.'
+        ),
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            metavar='X,Y', help='Start, metres east and north of the centre; default by --seed.'
+        ),
+    ] = None,
+    config: Annotated[
+        str, typer.Option(metavar='PRESET', help='Preset: dd_cs, d_cs, peace_cs, or a file.')
+    ] = 'peace_cs',
+    speed: Annotated[
+        float | None,
+        typer.Option(help='Simulated seconds per second; default: 2 if this machine keeps up.'),
+    ] = None,
+    seed: Annotated[int, typer.Option(help='Seed of the drawn world and of the start.')] = 1,
+    mavlink: Annotated[
+        str | None,
+        typer.Option(metavar='URL', help='An autopilot that is already there.'),
+    ] = None,
+    pose_mavlink: Annotated[
+        str | None,
+        typer.Option(metavar='URL', help='A second connection to it, which the camera follows.'),
+    ] = None,
+    run_dir: Annotated[
+        Path | None,
+        typer.Option(metavar='DIR', help='Empty or new folder for the results.'),
+    ] = None,
+    timeout: Annotated[
+        float, typer.Option(metavar='S', help='Seconds that the landing may take.')
+    ] = 280.0,
+) -> None:
+    """Fly a simulated vehicle from 100 m to 20 m over a place that the nodes choose by camera.
+
+    Exit status 0 only when it ended over a place that the ground truth does not call unsafe.
+    """
+    from rich.console import Console
+
+    from peace_ros.demo.options import DemoOptions, parse_start
+    from peace_ros.demo.run import run_demo
+
+    options = DemoOptions(
+        world=world,
+        gsd_m=gsd,
+        labels=labels,
+        start=None if start is None else parse_start(start),
+        config=config,
+        speed=speed,
+        seed=seed,
+        mavlink=mavlink,
+        pose_mavlink=pose_mavlink,
+        run_dir=run_dir,
+        timeout_s=timeout,
+    )
+    raise typer.Exit(run_demo(options, Console()))
+
+
+@app.command()
+@_in_one_sentence
+def replay(
+    *,
+    source: Annotated[Path, typer.Argument(help='Bag (folder, .mcap, .db3) or video file.')],
+    image_topic: Annotated[
+        str | None,
+        typer.Option(help='Image or CompressedImage; default: the only one, or /image.'),
+    ] = None,
+    pose_topic: Annotated[
+        str | None,
+        typer.Option(help='PoseStamped, PoseWithCovarianceStamped or Odometry, in ENU.'),
+    ] = None,
+    config: Annotated[str, typer.Option(metavar='PRESET', help='Preset or file.')] = 'peace_cs',
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar='DIR', help='Empty or new folder; default <source>_replay.'),
+    ] = None,
+    fov: Annotated[
+        float | None,
+        typer.Option(
+            metavar='DEG', help='Full horizontal field of view; default camera_info, else 73.'
+        ),
+    ] = None,
+    altitude: Annotated[
+        str, typer.Option(metavar='START:END', help='Metres, linear over the file; for videos.')
+    ] = '100:20',
+    every: Annotated[int, typer.Option(metavar='N', help='Take every N-th frame.')] = 1,
+    hz: Annotated[
+        float | None,
+        typer.Option(metavar='HZ', help='Take at most HZ frames per recorded second.'),
+    ] = None,
+    limit: Annotated[
+        int | None,
+        typer.Option(metavar='N', help='Stop after N frames.'),
+    ] = None,
+) -> None:
+    """Run prompts, segmentation and landing over a recording; the vehicle cannot be moved."""
+    from rich.console import Console
+
+    from peace_ros.replay import ReplayOptions, SourceOptions
+    from peace_ros.replay.console import replay_in_terminal
+
+    part = SourceOptions(
+        image_topic=image_topic,
+        pose_topic=pose_topic,
+        fov_x_deg=fov,
+        altitude=altitude,
+        every=every,
+        hz=hz,
+        limit=limit,
+    )
+    replay_in_terminal(ReplayOptions(source, config, out, part), Console())
+
+
+@models_app.command('list')
+@_in_one_sentence
+def models_list() -> None:
+    """List the bundles that ship with the package."""
+    from peace_ros.inference import Bundle
+    from peace_ros.resources import models_dir
+
+    for manifest in sorted(models_dir().glob('*/manifest.json')):
+        bundle = Bundle.load(manifest.parent)
+        size = sum(entry.bytes for entry in bundle.manifest.files.values())
+        typer.echo(f'{bundle.manifest.name}  {bundle.manifest.family}  {size / 1e6:.1f} MB')
+
+
+@models_app.command('info')
+@_in_one_sentence
+def models_info(name: Annotated[str, typer.Argument(help='Name or folder.')]) -> None:
+    """Show what a bundle's manifest says."""
+    from peace_ros.inference import Bundle
+
+    bundle = Bundle.load(name)
+    typer.echo((bundle.folder / 'manifest.json').read_text(encoding='utf-8').rstrip())
+
+
+@models_app.command('verify')
+@_in_one_sentence
+def models_verify(name: Annotated[str, typer.Argument(help='Name or folder.')]) -> None:
+    """Check every file of a bundle against the checksums of its manifest."""
+    from peace_ros.inference import Bundle
+
+    bundle = Bundle.load(name)
+    typer.echo(f'{bundle.manifest.name}: {len(bundle.manifest.files)} files are whole')
+
+
+def main() -> None:
+    """Run the command line."""
+    app()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,237 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Messages of ROS 2 <-> the nouns of the domain, for recordings (no rclpy needed).
+
+Readers work on any object with the fields of the message, be it from rosbags or from rclpy.
+Builders make messages of the rosbags type store.
+"""
+
+from __future__ import annotations
+
+from math import atan, isfinite
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from peace_ros.domain import Frame, ImageError, Pose, RecordingError
+from peace_ros.domain.geometry import attitude_enu_flu_to_ned_frd, enu_to_ned
+from peace_ros.recording.bag import TYPESTORE
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+IMAGE_TYPES = ('sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage')
+POSE_TYPES = (
+    'geometry_msgs/msg/PoseStamped',
+    'geometry_msgs/msg/PoseWithCovarianceStamped',
+    'nav_msgs/msg/Odometry',
+)
+
+MAX_IMAGE_PX = 64_000_000
+"""Larger images are refused: no nadir camera has them, a damaged header may claim them."""
+
+_CHANNELS = {'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4, 'mono8': 1, '8UC3': 3, '8UC1': 1}
+_TO_RGB = {
+    'bgr8': cv2.COLOR_BGR2RGB,
+    '8UC3': cv2.COLOR_BGR2RGB,
+    'rgba8': cv2.COLOR_RGBA2RGB,
+    'bgra8': cv2.COLOR_BGRA2RGB,
+    'mono8': cv2.COLOR_GRAY2RGB,
+    '8UC1': cv2.COLOR_GRAY2RGB,
+}
+_NS = 1_000_000_000
+_TYPES = TYPESTORE.types
+
+
+def stamp_ns_of(message: Any) -> int:
+    """Return the stamp of a message's header in nanoseconds."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * _NS + int(stamp.nanosec)
+
+
+def frame_from_message(message: Any) -> Frame:
+    """Return the frame of an Image or CompressedImage.
+
+    Raises:
+        ImageError: unknown encoding, impossible size, or bytes that are no whole image.
+
+    """
+    if hasattr(message, 'format'):
+        return Frame(_decompress(message), stamp_ns_of(message))
+    return Frame(_unpack(message), stamp_ns_of(message))
+
+
+def _unpack(message: Any) -> NDArray[np.uint8]:
+    encoding, height, width = str(message.encoding), int(message.height), int(message.width)
+    channels = _CHANNELS.get(encoding)
+    if channels is None:
+        raise ImageError(f'image encoding {encoding!r}: publish one of {", ".join(_CHANNELS)}')
+    _check_size(width, height)
+    row = width * channels
+    step = int(message.step) or row
+    data = np.frombuffer(memoryview(message.data), np.uint8)
+    if step < row or data.size < step * (height - 1) + row:
+        raise ImageError(
+            f'image {width} x {height} {encoding} with step {step} has {data.size} bytes: '
+            f'it needs {row * height}'
+        )
+    rows = np.lib.stride_tricks.as_strided(data, (height, row), (step, 1))
+    image = np.ascontiguousarray(rows).reshape(height, width, channels)
+    if encoding in _TO_RGB:
+        return np.asarray(cv2.cvtColor(image, _TO_RGB[encoding]), np.uint8)
+    return image
+
+
+def _decompress(message: Any) -> NDArray[np.uint8]:
+    data = np.frombuffer(memoryview(message.data), np.uint8)
+    kind = str(message.format)
+    if data.size == 0:
+        raise ImageError(f'compressed image ({kind!r}) has 0 bytes: publish whole JPEG or PNG')
+    if data[:2].tobytes() == b'\xff\xd8' and b'\xff\xd9' not in data[-64:].tobytes():
+        raise ImageError(
+            f'compressed image ({kind!r}) of {data.size} bytes is a JPEG without its end: it was '
+            'cut short on the way'
+        )
+    try:
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    except cv2.error as error:
+        raise ImageError(f'compressed image ({kind!r}) cannot be decoded: {error}') from error
+    if image is None:
+        raise ImageError(
+            f'compressed image ({kind!r}) of {data.size} bytes cannot be decoded: publish JPEG '
+            'or PNG'
+        )
+    _check_size(image.shape[1], image.shape[0])
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8)
+
+
+def _check_size(width: int, height: int) -> None:
+    if width < 1 or height < 1 or width * height > MAX_IMAGE_PX:
+        raise ImageError(f'image of {width} x {height} px: it must hold 1 to {MAX_IMAGE_PX} pixels')
+
+
+def pose_from_message(message: Any) -> Pose:
+    """Return the pose of a message of :data:`POSE_TYPES` (ENU, FLU; ground at z = 0).
+
+    Raises:
+        RecordingError: a number is not finite, or the attitude is no rotation.
+
+    """
+    pose = message.pose
+    pose = pose.pose if hasattr(pose, 'pose') else pose
+    position, turn = pose.position, pose.orientation
+    numbers = (position.x, position.y, position.z, turn.w, turn.x, turn.y, turn.z)
+    length = sum(each * each for each in numbers[3:]) ** 0.5
+    if not all(isfinite(each) for each in numbers) or not 0.9 < length < 1.1:
+        raise RecordingError(
+            f'pose {tuple(round(float(each), 3) for each in numbers)} at {stamp_ns_of(message)} '
+            'ns: it must be finite with a quaternion of unit length'
+        )
+    w, x, y, z = (float(each) / length for each in numbers[3:])
+    north, east, down = enu_to_ned(float(position.x), float(position.y), float(position.z))
+    return Pose(
+        stamp_ns=stamp_ns_of(message),
+        north_m=north,
+        east_m=east,
+        down_m=down,
+        quaternion_ned_frd=attitude_enu_flu_to_ned_frd((w, x, y, z)),
+        altitude_agl_m=-down,
+    )
+
+
+def fov_x_rad_of(camera_info: Any) -> float:
+    """Return the full horizontal field of view of a CameraInfo.
+
+    Raises:
+        RecordingError: it was never calibrated (focal length 0).
+
+    """
+    focal_px, width_px = float(camera_info.k[0]), int(camera_info.width)
+    if not focal_px > 0.0 or width_px < 1:
+        raise RecordingError(
+            f'camera_info with focal length {focal_px} px and width {width_px} px is not '
+            'calibrated: give --fov'
+        )
+    return 2.0 * atan(width_px / (2.0 * focal_px))
+
+
+def header(stamp_ns: int, frame_id: str = '') -> Any:
+    """Return a std_msgs/Header."""
+    time = _TYPES['builtin_interfaces/msg/Time'](sec=stamp_ns // _NS, nanosec=stamp_ns % _NS)
+    return _TYPES['std_msgs/msg/Header'](stamp=time, frame_id=frame_id)
+
+
+def mono8_image(grey: NDArray[np.uint8], stamp_ns: int, frame_id: str = 'camera') -> Any:
+    """Return a sensor_msgs/Image of a height x width uint8 array."""
+    height, width = grey.shape
+    return _TYPES['sensor_msgs/msg/Image'](
+        header=header(stamp_ns, frame_id),
+        height=height,
+        width=width,
+        encoding='mono8',
+        is_bigendian=0,
+        step=width,
+        data=np.ascontiguousarray(grey).reshape(-1),
+    )
+
+
+def jpeg_image(
+    image_rgb: NDArray[np.uint8], stamp_ns: int, frame_id: str = 'camera', quality: int = 90
+) -> Any:
+    """Return a sensor_msgs/CompressedImage (JPEG) of a height x width x 3 uint8 RGB array."""
+    return _TYPES['sensor_msgs/msg/CompressedImage'](
+        header=header(stamp_ns, frame_id),
+        format='rgb8; jpeg compressed bgr8',
+        data=encode_jpeg(image_rgb, quality),
+    )
+
+
+def encode_jpeg(image_rgb: NDArray[np.uint8], quality: int = 90) -> NDArray[np.uint8]:
+    """Return the bytes of a JPEG of a height x width x 3 uint8 RGB array."""
+    done, data = cv2.imencode(
+        '.jpg', cv2.cvtColor(image_rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality]
+    )
+    if not done:
+        raise ImageError(f'image of shape {image_rgb.shape} cannot be encoded as JPEG')
+    return np.asarray(data, np.uint8).reshape(-1)
+
+
+def diagnostic_array(
+    stamp_ns: int, name: str, level: int, sentence: str, values: Mapping[str, str]
+) -> Any:
+    """Return a diagnostic_msgs/DiagnosticArray with one status; level 0 ok, 1 warn, 2 error."""
+    pair = _TYPES['diagnostic_msgs/msg/KeyValue']
+    status = _TYPES['diagnostic_msgs/msg/DiagnosticStatus'](
+        level=level,
+        name=name,
+        message=sentence,
+        hardware_id='',
+        values=[pair(key=key, value=value) for key, value in values.items()],
+    )
+    return _TYPES['diagnostic_msgs/msg/DiagnosticArray'](header=header(stamp_ns), status=[status])
+
+
+def diagnostic_values(message: Any) -> dict[str, str]:
+    """Return the key/value pairs of the first status of a DiagnosticArray."""
+    statuses: Sequence[Any] = message.status
+    if not statuses:
+        return {}
+    return {each.key: each.value for each in statuses[0].values}
+
+
+def pose_stamped(
+    stamp_ns: int,
+    position_enu: tuple[float, float, float],
+    attitude_enu_flu: tuple[float, float, float, float],
+    frame_id: str = 'map',
+) -> Any:
+    """Return a geometry_msgs/PoseStamped (ENU metres; quaternion w, x, y, z)."""
+    x, y, z = position_enu
+    qw, qx, qy, qz = attitude_enu_flu
+    pose = _TYPES['geometry_msgs/msg/Pose'](
+        position=_TYPES['geometry_msgs/msg/Point'](x=x, y=y, z=z),
+        orientation=_TYPES['geometry_msgs/msg/Quaternion'](x=qx, y=qy, z=qz, w=qw),
+    )
+    return _TYPES['geometry_msgs/msg/PoseStamped'](header=header(stamp_ns, frame_id), pose=pose)

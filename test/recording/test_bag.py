@@ -1,0 +1,224 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Bags are written whole or not at all, and read from either storage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from peace_ros.domain import ImageError, RecordingError
+from peace_ros.recording import TYPESTORE, BagReader, BagWriter
+from peace_ros.recording.messages import (
+    diagnostic_array,
+    diagnostic_values,
+    frame_from_message,
+    header,
+    jpeg_image,
+    mono8_image,
+    pose_from_message,
+    pose_stamped,
+    stamp_ns_of,
+)
+
+SECOND = 1_000_000_000
+
+
+def gradient(height: int = 40, width: int = 60) -> np.ndarray:
+    rows, columns = np.mgrid[0:height, 0:width]
+    return np.stack([columns * 4, rows * 6, np.full_like(rows, 90)], axis=-1).astype(np.uint8)
+
+
+def raw_image(image: np.ndarray, encoding: str, stamp_ns: int, padding: int = 0):
+    height, width = image.shape[:2]
+    rows = image.reshape(height, -1)
+    padded = np.pad(rows, ((0, 0), (0, padding)))
+    return TYPESTORE.types['sensor_msgs/msg/Image'](
+        header=header(stamp_ns),
+        height=height,
+        width=width,
+        encoding=encoding,
+        is_bigendian=0,
+        step=padded.shape[1],
+        data=padded.reshape(-1),
+    )
+
+
+def write_mcap(path: Path, messages) -> Path:
+    with BagWriter(path) as bag:
+        for topic, stamp_ns, message in messages:
+            bag.write(topic, stamp_ns, message)
+    return path
+
+
+def write_sqlite3(path: Path, messages) -> Path:
+    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as bag:
+        known = {}
+        for topic, stamp_ns, message in messages:
+            kind = message.__msgtype__
+            if topic not in known:
+                known[topic] = bag.add_connection(topic, kind, typestore=TYPESTORE)
+            bag.write(known[topic], stamp_ns, TYPESTORE.serialize_cdr(message, kind))
+    return path
+
+
+WRITERS = {'mcap': (write_mcap, 'bag.mcap'), 'sqlite3': (write_sqlite3, 'bag')}
+
+
+@pytest.mark.parametrize('storage', WRITERS)
+def test_what_is_written_is_read_back(tmp_path, storage) -> None:
+    write, name = WRITERS[storage]
+    picture = gradient()
+    level = (1.0, 0.0, 0.0, 0.0)
+    path = write(
+        tmp_path / name,
+        [
+            ('/image', 5 * SECOND, raw_image(picture, 'rgb8', 5 * SECOND)),
+            ('/image/compressed', 5 * SECOND, jpeg_image(picture, 5 * SECOND, quality=95)),
+            ('/pose', 6 * SECOND, pose_stamped(6 * SECOND, (3.0, 4.0, 50.0), level)),
+        ],
+    )
+    with BagReader(path) as bag:
+        assert list(bag.topics) == ['/image', '/image/compressed', '/pose']
+        assert bag.count('/image') == 1
+        found = {topic: message for topic, _, message in bag.messages(bag.topics)}
+    frame = frame_from_message(found['/image'])
+    assert frame.stamp_ns == 5 * SECOND
+    np.testing.assert_array_equal(frame.image_rgb, picture)
+    jpeg = frame_from_message(found['/image/compressed']).image_rgb
+    assert np.abs(jpeg.astype(int) - picture).mean() < 4.0
+    pose = pose_from_message(found['/pose'])
+    assert (pose.north_m, pose.east_m, pose.altitude_agl_m) == (4.0, 3.0, 50.0)
+    assert stamp_ns_of(found['/pose']) == 6 * SECOND
+
+
+def test_raw_bytes_are_recorded_as_they_came(tmp_path) -> None:
+    message = diagnostic_array(7, 'landing', 1, 'holding', {'state': 'HOLD'})
+    cdr = bytes(TYPESTORE.serialize_cdr(message, message.__msgtype__))
+    with BagWriter(tmp_path / 'raw.mcap') as bag:
+        bag.add_topic('/landing/status', message.__msgtype__)
+        bag.add_topic('/silent', 'sensor_msgs/msg/Image')
+        bag.write_raw('/landing/status', 7, cdr)
+    with BagReader(tmp_path / 'raw.mcap') as bag:
+        assert '/silent' in bag.topics
+        ((_, stamp_ns, found),) = bag.messages(['/landing/status'])
+    assert stamp_ns == 7
+    assert diagnostic_values(found) == {'state': 'HOLD'}
+    assert found.status[0].message == 'holding'
+
+
+def test_nothing_is_left_after_an_error(tmp_path) -> None:
+    def fail() -> None:
+        with BagWriter(tmp_path / 'run.mcap') as bag:
+            bag.write('/heatmap', 1, mono8_image(gradient()[:, :, 0], 1))
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_name_appears_only_when_the_bag_is_whole(tmp_path) -> None:
+    path = tmp_path / 'run.mcap'
+    with BagWriter(path) as bag:
+        bag.write('/heatmap', 1, mono8_image(gradient()[:, :, 0], 1))
+        assert not path.exists()
+    assert [each.name for each in tmp_path.iterdir()] == ['run.mcap']
+
+
+def test_an_existing_bag_is_not_overwritten(tmp_path) -> None:
+    (tmp_path / 'run.mcap').write_bytes(b'precious')
+    with pytest.raises(RecordingError, match='exists already'):
+        BagWriter(tmp_path / 'run.mcap')
+    assert (tmp_path / 'run.mcap').read_bytes() == b'precious'
+
+
+def test_a_place_that_cannot_be_written_to_is_named(tmp_path) -> None:
+    (tmp_path / 'file').write_text('')
+    with (
+        pytest.raises(RecordingError, match='cannot be written'),
+        BagWriter(tmp_path / 'file' / 'run.mcap'),
+    ):
+        pass
+
+
+def test_a_missing_topic_is_answered_with_those_that_are_there(tmp_path) -> None:
+    path = write_mcap(tmp_path / 'a.mcap', [('/camera/down', 1, jpeg_image(gradient(), 1))])
+    with BagReader(path) as bag:
+        with pytest.raises(RecordingError, match=r'no topic /image.*/camera/down'):
+            list(bag.messages(['/image']))
+        with pytest.raises(RecordingError, match=r'CompressedImage: give a .*PoseStamped'):
+            bag.require('/camera/down', ['geometry_msgs/msg/PoseStamped'])
+
+
+@pytest.mark.parametrize(
+    'content', [b'', b'no bag at all', b'\x89MCAP\x30\r\n'], ids=['empty', 'text', 'head']
+)
+def test_a_file_that_is_no_bag_is_one_sentence(tmp_path, content) -> None:
+    path = tmp_path / 'broken.mcap'
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match='cannot be read'), BagReader(path):
+        pass
+
+
+@pytest.mark.parametrize('part', [0.3, 0.7, 0.95])
+def test_a_bag_that_is_cut_short_is_an_error_and_never_a_shorter_bag(tmp_path, part) -> None:
+    messages = [('/image', k, raw_image(gradient(), 'rgb8', k)) for k in range(1, 50)]
+    whole = write_mcap(tmp_path / 'whole.mcap', messages).read_bytes()
+    cut = tmp_path / 'cut.mcap'
+    cut.write_bytes(whole[: int(part * len(whole))])
+    with pytest.raises(RecordingError), BagReader(cut) as bag:
+        assert len(list(bag.messages(['/image']))) < 49
+
+
+def test_a_folder_without_a_bag_is_refused(tmp_path) -> None:
+    with pytest.raises(RecordingError, match=r'metadata\.yaml'):
+        BagReader(tmp_path)
+    with pytest.raises(RecordingError, match='does not exist'):
+        BagReader(tmp_path / 'nothing.mcap')
+
+
+@pytest.mark.parametrize(
+    ('encoding', 'order'), [('rgb8', [0, 1, 2]), ('bgr8', [2, 1, 0]), ('8UC3', [2, 1, 0])]
+)
+def test_encodings_and_padded_rows_come_out_as_rgb(encoding, order) -> None:
+    picture = gradient()
+    message = raw_image(np.ascontiguousarray(picture[:, :, order]), encoding, 1, padding=4)
+    np.testing.assert_array_equal(frame_from_message(message).image_rgb, picture)
+
+
+def test_images_that_cannot_be_used_say_why() -> None:
+    depth = raw_image(gradient(), 'rgb8', 1)
+    depth.encoding = '32FC1'
+    with pytest.raises(ImageError, match='32FC1'):
+        frame_from_message(depth)
+    short = raw_image(gradient(), 'rgb8', 1)
+    short.data = short.data[:-1]
+    with pytest.raises(ImageError, match='bytes'):
+        frame_from_message(short)
+    huge = raw_image(gradient(), 'rgb8', 1)
+    huge.height = huge.width = 100_000
+    with pytest.raises(ImageError, match='100000'):
+        frame_from_message(huge)
+    jpeg = jpeg_image(gradient(), 1)
+    for length in (0, 1, 10, len(jpeg.data) // 2, len(jpeg.data) - 2):
+        cut = jpeg_image(gradient(), 1)
+        cut.data = jpeg.data[:length]
+        with pytest.raises(ImageError):
+            frame_from_message(cut)
+
+
+@pytest.mark.parametrize(
+    ('position', 'turn'),
+    [
+        ((float('nan'), 0.0, 1.0), (1.0, 0.0, 0.0, 0.0)),
+        ((0.0, 0.0, float('inf')), (1.0, 0.0, 0.0, 0.0)),
+        ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_a_pose_that_is_none_is_refused(position, turn) -> None:
+    with pytest.raises(RecordingError, match='finite'):
+        pose_from_message(pose_stamped(1, position, turn))
