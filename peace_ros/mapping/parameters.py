@@ -23,8 +23,8 @@ class MapParameters:
     )
     neutral_score: float = parameter(
         0.5,
-        'Heatmap value that speaks neither for safe nor for unsafe: the threshold that the '
-        'manifest of the segmentation model recommends.',
+        'Heatmap value that speaks neither for safe nor for unsafe; heatmaps are calibrated so '
+        'that it is 0.5.',
         low=0.05,
         high=0.95,
     )

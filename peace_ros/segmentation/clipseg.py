@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from peace_ros.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
 from peace_ros.inference import Bundle, Preprocessor, TextEncoder, open_sessions
 from peace_ros.inference.contract import IS_POSITIVE, PIXEL_VALUES, TERM_LOGITS, TEXT_EMBEDDING
-from peace_ros.segmentation.fusion import FUSIONS
+from peace_ros.segmentation.fusion import FUSIONS, calibrated
 from peace_ros.segmentation.segmenter import SegmentationParameters
 from peace_ros.segmentation.terms import Terms
 
@@ -45,6 +45,7 @@ class ClipSegSegmenter:
         bundle.require_family('clipseg')
         self._terms = terms
         self._fusion = FUSIONS[parameters.fusion]
+        self._threshold = _threshold(bundle, parameters.fusion)
         self._sessions = open_sessions(
             bundle,
             ('image_encoder', 'text_encoder', 'decoder'),
@@ -90,12 +91,14 @@ class ClipSegSegmenter:
     def segment(self, frame: Frame, prompt: Prompt) -> Heatmap:
         """Return the safety of each pixel at network resolution, with the frame's stamp.
 
+        0.5 is the score from which the bundle recommends to call ground safe.
+
         Raises ImageError for an image that cannot be used, BundleError for an answer of the
         network that cannot be used.
         """
         maps = self._decode(frame, prompt, self._fusion.outputs)
         safety = self._fusion.combine(*(self._checked(each) for each in maps))
-        return Heatmap(safety, frame.stamp_ns)
+        return Heatmap(calibrated(safety, self._threshold), frame.stamp_ns)
 
     def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
         """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``."""
@@ -143,3 +146,16 @@ class ClipSegSegmenter:
             f'{path}: gave {what} where finite maps of 0 to 1 are due; the frame gets no '
             'heatmap, choose another bundle if this stays'
         )
+
+
+def _threshold(bundle: Bundle, fusion: str) -> float:
+    """Return the bundle's recommendation, which was measured with the set difference."""
+    if fusion != 'set_difference':
+        return 0.5
+    threshold = float(bundle.manifest.recommended.get('threshold', 0.5))
+    if not 0.0 < threshold < 1.0:
+        raise BundleError(
+            f'{bundle.folder / "manifest.json"}: recommended threshold {threshold} must lie '
+            'between 0 and 1, both excluded: correct the manifest or export the bundle anew'
+        )
+    return threshold

@@ -37,6 +37,22 @@ def softmax_positive(score: Array) -> Array:
     return score
 
 
+def calibrated(safety: Array, threshold: float) -> Array:
+    """Return scores in which 0.5 stands where the threshold stood.
+
+    A shift in log-odds: 0, 1 and the order of scores stay. Whoever reads a heatmap then needs
+    not know which model made it.
+
+    Args:
+        safety: h x w float32, 0 to 1.
+        threshold: score from which the model's makers call ground safe, 0 < threshold < 1.
+    """
+    for_safe = safety * np.float32(1.0 - threshold)
+    against = (np.float32(1.0) - safety) * np.float32(threshold)
+    shifted: Array = for_safe / (for_safe + against)
+    return shifted
+
+
 @dataclass(frozen=True)
 class Fusion:
     """A way to make one score, and the network outputs that it needs for that."""

@@ -181,3 +181,22 @@ def test_a_clip_bundle_is_refused(tiny: Any, tmp_path: Path) -> None:
 def test_parameters_out_of_bounds_are_refused(changes: dict[str, Any], says: str) -> None:
     with pytest.raises(ConfigurationError, match=says):
         SegmentationParameters(**changes)
+
+
+def test_the_recommended_threshold_of_the_bundle_becomes_one_half(
+    tiny: Any, clipseg_folder: Path, frame: Frame
+) -> None:
+    plain = make(clipseg_folder).segment(frame, SPRING).safety
+    threshold = float(np.median(plain))
+    tiny.edit_manifest(clipseg_folder, recommended={'threshold': threshold})
+    calibrated = make(clipseg_folder).segment(frame, SPRING).safety
+    np.testing.assert_array_equal(calibrated > 0.5001, plain > threshold + 1e-4)
+
+
+@pytest.mark.parametrize('threshold', [0.0, 1.0, -3.0])
+def test_a_threshold_that_calls_everything_the_same_is_refused(
+    tiny: Any, clipseg_folder: Path, threshold: float
+) -> None:
+    tiny.edit_manifest(clipseg_folder, recommended={'threshold': threshold})
+    with pytest.raises(BundleError, match='between 0 and 1'):
+        make(clipseg_folder)

@@ -11,6 +11,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from peace_ros.segmentation import FUSIONS, set_difference, soft_difference
+from peace_ros.segmentation.fusion import calibrated
 
 SCORES = arrays(np.float32, (3, 4), elements=st.floats(0.0, 1.0, width=32))
 Maps = NDArray[np.float32]
@@ -53,3 +54,15 @@ def test_each_fusion_names_the_outputs_it_needs() -> None:
         'soft': ('positive', 'negative'),
         'softmax': ('softmax_positive',),
     }
+
+
+@given(SCORES, st.floats(0.05, 0.95))
+def test_calibration_moves_the_threshold_to_one_half_and_keeps_the_order(
+    scores: Maps, threshold: float
+) -> None:
+    moved = calibrated(scores, threshold)
+    assert moved.dtype == np.float32
+    assert ((moved >= 0.0) & (moved <= 1.0)).all()
+    assert (np.diff(moved.ravel()[np.argsort(scores.ravel())]) >= 0.0).all()
+    assert abs(float(calibrated(np.float32([[threshold]]), threshold)[0, 0]) - 0.5) < 1e-5
+    assert calibrated(np.float32([[0.0, 1.0]]), threshold).tolist() == [[0.0, 1.0]]
