@@ -93,7 +93,7 @@ class HeatmapIntake:
             except ImageError:
                 self._reject('values outside of 0 to 1')
             except VehicleError:
-                self._reject('its pose is not above ground')
+                self._reject('taken too low above ground')
             else:
                 self.counts['used'] += 1
 

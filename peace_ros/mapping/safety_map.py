@@ -30,6 +30,8 @@ from peace_ros.mapping.projection import (
     worst_part,
 )
 
+LOWEST_LOOK_M = 1.0
+"""From lower, a frame shows less ground than the vehicle covers, and a cell is the whole image."""
 _NS = 1e-9
 _NEVER_S = np.float32(-1e9)
 _LOOKS_LIMIT = 60_000
@@ -115,9 +117,10 @@ class SafetyMap:
                 f'{self._stamp_ns} ns'
             )
         numbers = (pose.north_m, pose.east_m, pose.altitude_agl_m, *pose.quaternion_ned_frd)
-        if not np.all(np.isfinite(numbers)) or pose.altitude_agl_m <= 0.0:
+        if not np.all(np.isfinite(numbers)) or pose.altitude_agl_m < LOWEST_LOOK_M:
             raise VehicleError(
-                f'pose {numbers}: must be finite and above ground to project a heatmap'
+                f'pose {numbers}: must be finite and {LOWEST_LOOK_M} m or more above ground to '
+                'project a heatmap'
             )
 
     def _follow(self, pose: Pose) -> None:

@@ -206,3 +206,11 @@ def test_adding_a_heatmap_is_quick():
         safety_map.add(heatmap, CAMERA, pose_of(100.0, number))
         spent.append(time.process_time() - begin)
     assert min(spent) < 0.04
+
+
+@pytest.mark.parametrize('altitude_m', [1e-6, 0.01, 0.5])
+def test_a_frame_taken_on_the_ground_is_refused_and_the_map_stays_usable(altitude_m):
+    safety_map = looked([0.9] * 5)
+    with pytest.raises(VehicleError, match='above ground'):
+        safety_map.add(even(0.9, 10.0, 352), CAMERA, pose_of(altitude_m))
+    safety_map.add(even(0.9, 11.0, 352), CAMERA, pose_of(1.0))
