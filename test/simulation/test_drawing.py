@@ -37,6 +37,12 @@ def window(size_m: float, gsd_m: float) -> Window:
     return Window(-size_m / 2, -size_m / 2, count, count, gsd_m)
 
 
+def test_every_layout_is_drawn_however_small_the_piece_of_ground():
+    for layout in LAYOUTS:
+        for seed in range(8):
+            assert draw_scene(seed, 64, 0.05, layout=layout).labels.shape == (64, 64)
+
+
 def test_a_scene_has_the_asked_shape_and_every_pixel_a_class():
     scene = draw_scene(7, 200, 0.2, season='autumn', layout='suburb')
     assert scene.image_rgb.shape == (200, 200, 3)

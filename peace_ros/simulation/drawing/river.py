@@ -40,7 +40,7 @@ def add_river(f: Furnisher, area: Block, share: tuple[float, float]) -> None:
             if rng.random() < 0.5:
                 away = side * (0.5 * width + margin * rng.uniform(0.2, 1.0))
                 f.person(float(line[k, 0] + away), float(line[k, 1] + rng.uniform(-3, 3)))
-    if rng.random() < 0.5:
+    if len(line) > 16 and rng.random() < 0.5:
         k = int(rng.integers(8, len(line) - 8))
         y = float(line[k, 1])
         half = 0.5 * width + margin + 12.0

@@ -1,0 +1,147 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The whole training as one recipe: scenes, ranker, segmenter, threshold, bundles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, cast
+
+import torch
+
+from peace_ros.training import ranker, segmenter
+from peace_ros.training.export import export_ranker, export_segmenter, with_weights
+from peace_ros.training.loop import Budget, train
+from peace_ros.training.measure import SafetyModel, choose_threshold, drawn_examples
+from peace_ros.training.sources import SCENE_PX, load_drawn, load_real
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from peace_ros.training.networks import Ranker, Segmenter
+    from peace_ros.training.sources import Source
+
+_RANKER_SHARE = 0.12
+"""Of the minutes; the segmenter gets the rest."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What to train on and for how long."""
+
+    out: Path
+    """Folder that gets ``clip-small`` and ``clipseg-small``."""
+    work: Path
+    """Folder of drawn scenes, checkpoints and curves; a run that was cut short goes on from it."""
+    real: Path | None = None
+    """Folder of real images with manifest.csv, or none."""
+    minutes: float = 40.0
+    steps: int | None = None
+    """Steps of each network in place of minutes; the result then depends on the seed alone."""
+    seed: int = 0
+    scenes: int = 400
+    validation_scenes: int = 60
+    batch_size: int = segmenter.BATCH_SIZE
+    view_px: int = segmenter.VIEW_PX
+    scene_px: int = SCENE_PX
+    text_steps: int = 600
+
+
+def run(recipe: Recipe, report: Callable[[str, float, str], None]) -> None:
+    """Train both networks and write both bundles.
+
+    ``report`` gets the stage, its progress (0 to 1) and a line of figures.
+    """
+    sources = _load_sources(recipe, report)
+    provenance = _provenance(recipe, sources)
+    clipseg = _train_segmenter(recipe, sources, report)
+    report('threshold', 0.0, '')
+    threshold = _threshold(recipe, clipseg)
+    report('threshold', 1.0, f'recommended {threshold}')
+    export_segmenter(
+        clipseg,
+        recipe.out / 'clipseg-small',
+        provenance=provenance,
+        recommended={'threshold': threshold},
+    )
+    clip = _train_ranker(recipe, sources, report)
+    export_ranker(clip, recipe.out / 'clip-small', provenance=provenance, recommended={})
+
+
+def _load_sources(recipe: Recipe, report: Callable[[str, float, str], None]) -> list[Source]:
+    def drawn(done: int) -> None:
+        report('scenes', done / recipe.scenes, f'{done} of {recipe.scenes}')
+
+    first = recipe.seed * 100_000
+    seeds = range(first, first + recipe.scenes)
+    sources = load_drawn(recipe.work / 'scenes', seeds, size_px=recipe.scene_px, report=drawn)
+    report('scenes', 1.0, f'{recipe.scenes} of {recipe.scenes}')
+    return sources + load_real(recipe.real)
+
+
+def _train_ranker(
+    recipe: Recipe, sources: list[Source], report: Callable[[str, float, str], None]
+) -> Ranker:
+    model = ranker.create_ranker(recipe.seed)
+    state = train(
+        model,
+        ranker.create_maker(sources, recipe.seed, batch_size=recipe.batch_size),
+        ranker.RankerLoss(recipe.seed),
+        Budget(recipe.minutes * _RANKER_SHARE, recipe.steps),
+        peak_rate=ranker.PEAK_RATE,
+        folder=recipe.work,
+        name='ranker',
+        report=lambda progress, line: report('ranker', progress, line),
+    )
+    return cast('Ranker', with_weights(model, state))
+
+
+def _train_segmenter(
+    recipe: Recipe, sources: list[Source], report: Callable[[str, float, str], None]
+) -> Segmenter:
+    model = segmenter.create_segmenter(recipe.seed)
+    if not (recipe.work / 'segmenter.pt').exists():
+        report('text', 0.0, '')
+        loss = segmenter.teach_text(model, recipe.seed, recipe.text_steps)
+        report('text', 1.0, f'loss {loss:.4f}')
+    state = train(
+        model,
+        segmenter.create_maker(
+            sources, recipe.seed, batch_size=recipe.batch_size, view_px=recipe.view_px
+        ),
+        segmenter.SegmenterLoss(),
+        Budget(recipe.minutes * (1.0 - _RANKER_SHARE), recipe.steps),
+        peak_rate=segmenter.PEAK_RATE,
+        folder=recipe.work,
+        name='segmenter',
+        report=lambda progress, line: report('segmenter', progress, line),
+    )
+    return cast('Segmenter', with_weights(model, state))
+
+
+def _threshold(recipe: Recipe, model: Segmenter) -> float:
+    """Export aside, measure on drawn scenes that training has not seen, choose."""
+    with TemporaryDirectory() as folder:
+        aside = Path(folder) / 'clipseg-small'
+        export_segmenter(model, aside, provenance='candidate', recommended={})
+        examples = drawn_examples(recipe.work / 'scenes', recipe.validation_scenes)
+        return choose_threshold(SafetyModel(aside), examples)
+
+
+def _provenance(recipe: Recipe, sources: list[Source]) -> str:
+    real = sum(source.kind != 'drawn' for source in sources)
+    length = f'{recipe.steps} steps' if recipe.steps else f'{recipe.minutes:g} minutes on two cores'
+    text = (
+        f'Trained from scratch with peace_ros.training (torch {torch.__version__}, seed '
+        f'{recipe.seed}, {length}) on {recipe.scenes} scenes drawn by peace_ros'
+    )
+    if real:
+        text += (
+            f' and {real} real images: Semantic segmentation of aerial imagery (CC0, Humans in '
+            'the Loop with MBRSC), odm_data_caliterra (CC0, Dennis Baldwin), '
+            'drone_dataset_brighton_beach (BSD-2-Clause, Piero Toffanin), odm_boruszyn_kap '
+            '(CC-BY 3.0, Andrew Zaborowski / OpenStreetMap-PL)'
+        )
+    return text + '.'
