@@ -5,12 +5,8 @@
 from peace_ros.inference.bundle import Bundle, FileEntry, InputSpec, Manifest
 from peace_ros.inference.clip import ClipEncoder
 from peace_ros.inference.preprocess import Preprocessor
-from peace_ros.inference.session import (
-    DEFAULT_PROVIDERS,
-    Session,
-    check_providers,
-    open_sessions,
-)
+from peace_ros.inference.providers import available_providers, check_providers
+from peace_ros.inference.session import DEFAULT_PROVIDERS, Session, open_sessions
 from peace_ros.inference.text_cache import TextCache
 from peace_ros.inference.text_encoder import TextEncoder
 from peace_ros.inference.tokenizer import Tokenizer, Tokens
@@ -28,6 +24,7 @@ __all__ = [
     'TextEncoder',
     'Tokenizer',
     'Tokens',
+    'available_providers',
     'check_providers',
     'open_sessions',
 ]

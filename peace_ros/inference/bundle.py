@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -36,7 +38,7 @@ class Bundle:
 
     @classmethod
     def load(cls, path_or_name: Path | str) -> Bundle:
-        """Load from a folder, or by name from the bundles that ship with the package.
+        """Load from a folder, or by name: the bundles of the package, then the user's own.
 
         Raises BundleError that names the file, what is wrong with it and what to do. The graphs
         are held against their family's tensors when a session opens them.
@@ -64,19 +66,58 @@ class Bundle:
             )
 
 
+def user_models_dir() -> Path:
+    """Return the user's folder of bundles: PEACE_MODELS_DIR or one in the home directory."""
+    return Path(os.environ.get('PEACE_MODELS_DIR', '~/.local/share/peace_ros/models')).expanduser()
+
+
+def put_in_place(stage: Path, folder: Path) -> None:
+    """Let a finished folder take the place of another beside it; raises OSError.
+
+    An older bundle is set aside first and comes back when the new one cannot be moved.
+    """
+    old = folder.with_name(f'.{folder.name}.old')
+    if folder.exists():
+        shutil.rmtree(old, ignore_errors=True)
+        folder.rename(old)
+    try:
+        stage.rename(folder)
+    except OSError:
+        if old.exists():
+            old.rename(folder)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
 def _find(path_or_name: Path | str) -> Path:
     folder = Path(path_or_name).expanduser()
     if folder.is_dir():
         return folder
     shipped = models_dir()
     name = str(path_or_name)
-    if name and Path(name).name == name and (shipped / name).is_dir():
-        return shipped / name
+    if name and Path(name).name == name:
+        for place in (shipped, user_models_dir()):
+            if (place / name).is_dir():
+                return place / name
     names = sorted(each.parent.name for each in shipped.glob(f'*/{MANIFEST_NAME}'))
     raise BundleError(
         f'no model bundle {name!r}: give a folder with a {MANIFEST_NAME} or the name of a '
         f'shipped bundle ({", ".join(names) or "none"} in {shipped})'
     )
+
+
+def file_entry(path: Path) -> dict[str, str | int]:
+    """Return what a manifest says of a file: its SHA-256 and its size."""
+    return {'sha256': sha256_of(path), 'bytes': path.stat().st_size}
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file, in hex; raises OSError."""
+    digest = hashlib.sha256()
+    with path.open('rb') as file:
+        while chunk := file.read(_CHUNK_BYTES):
+            digest.update(chunk)
+    return digest.hexdigest()
 
 
 def _check_file(path: Path, entry: FileEntry) -> None:
@@ -87,16 +128,13 @@ def _check_file(path: Path, entry: FileEntry) -> None:
                 f'{path}: {size} bytes where the manifest says {entry.bytes}; '
                 'fetch or build the bundle again'
             )
-        digest = hashlib.sha256()
-        with path.open('rb') as file:
-            while chunk := file.read(_CHUNK_BYTES):
-                digest.update(chunk)
+        found = sha256_of(path)
     except OSError as error:
         raise BundleError(
             f'{path}: {error.strerror}, yet the manifest lists it; fetch or build the bundle again'
         ) from error
-    if digest.hexdigest() != entry.sha256:
+    if found != entry.sha256:
         raise BundleError(
-            f'{path}: SHA-256 {digest.hexdigest()} where the manifest says {entry.sha256}; '
+            f'{path}: SHA-256 {found} where the manifest says {entry.sha256}; '
             'the file was changed or damaged, fetch or build the bundle again'
         )

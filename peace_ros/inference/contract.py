@@ -25,6 +25,8 @@ POSITIVE = 'positive'
 NEGATIVE = 'negative'
 SOFTMAX_POSITIVE = 'softmax_positive'
 TERM_LOGITS = 'term_logits'
+PREDICTIONS = 'predictions'
+PROTOTYPES = 'prototypes'
 
 _FLOAT = 'tensor(float)'
 _INT64 = 'tensor(int64)'
@@ -68,12 +70,27 @@ def check_graphs(manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
         _match(text, 'output', text.outputs, [_tensor(TEXT_EMBEDDING, 'B', width)])
     if 'image_encoder' in graphs:
         image = graphs['image_encoder']
-        size = manifest.input
-        _match(image, 'input', image.inputs, [_tensor(PIXEL_VALUES, 1, 3, size.height, size.width)])
-        if manifest.family == 'clip':
-            _match(image, 'output', image.outputs, [_tensor(IMAGE_EMBEDDING, 1, width)])
+        size = manifest.encoder_input
+        # All segments of a frame go through CLIP together, and their number varies.
+        batch: Size = 'B' if manifest.family == 'fastsam' else 1
+        pixels = _tensor(PIXEL_VALUES, batch, 3, size.height, size.width)
+        _match(image, 'input', image.inputs, [pixels])
+        if manifest.family != 'clipseg':
+            _match(image, 'output', image.outputs, [_tensor(IMAGE_EMBEDDING, batch, width)])
+    if 'segmenter' in graphs:
+        _check_segmenter(graphs['segmenter'], manifest)
     if 'decoder' in graphs and 'image_encoder' in graphs:
         _check_decoder(graphs['decoder'], graphs['image_encoder'].outputs, width)
+
+
+def _check_segmenter(segmenter: Graph, manifest: Manifest) -> None:
+    size = manifest.input
+    wanted = [_tensor(PIXEL_VALUES, 1, 3, size.height, size.width)]
+    _match(segmenter, 'input', segmenter.inputs, wanted)
+    masks = next((each.shape[1:2] for each in segmenter.outputs if each.name == PROTOTYPES), ())
+    rows: Size = 5 + masks[0] if masks and isinstance(masks[0], int) else None
+    outputs = [_tensor(PREDICTIONS, 1, rows, None), _tensor(PROTOTYPES, 1, None, None, None)]
+    _match(segmenter, 'output', segmenter.outputs, outputs)
 
 
 def _check_decoder(decoder: Graph, features: Sequence[Tensor], width: int) -> None:

@@ -21,11 +21,22 @@ ROLES_BY_FAMILY: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         'clip': ('image_encoder', 'text_encoder', 'tokenizer'),
         'clipseg': ('image_encoder', 'text_encoder', 'decoder', 'tokenizer'),
+        'fastsam': ('segmenter', 'image_encoder', 'text_encoder', 'tokenizer'),
     }
 )
-RESIZES = ('stretch', 'crop')
+RESIZES_BY_FAMILY: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        'clip': ('stretch', 'crop'),
+        # A heatmap covers the whole frame, so a segmenter must see the whole frame.
+        'clipseg': ('stretch',),
+        'fastsam': ('letterbox',),
+    }
+)
+INTERPOLATIONS = ('area', 'bilinear', 'bicubic')
 PRECISIONS = ('fp32', 'fp16', 'int8')
 MAX_INPUT_PX = 4096
+LOGIT_SCALE = 100.0
+"""exp of the temperature at which CLIP's training was held (Radford et al. 2021, section 2.5)."""
 _SHA256 = re.compile(r'[0-9a-f]{64}')
 _FILE_NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.\-]*')
 
@@ -37,10 +48,13 @@ class InputSpec:
     width: int
     height: int
     resize: str
-    """``stretch`` to width x height, or ``crop``: shorter side first, then the centre."""
+    """``stretch`` to width x height, ``crop``: shorter side first, then the centre, or
+    ``letterbox``: the longer side first, then borders around it."""
     mean: tuple[float, float, float]
     std: tuple[float, float, float]
     """RGB, of values 0 to 1."""
+    interpolation: str = 'area'
+    """``area`` averages; ``bilinear`` and ``bicubic`` are Pillow's, as CLIP and CLIPSeg learned."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +83,15 @@ class Manifest:
     provenance: str
     recommended: Mapping[str, float]
     """Advice for those who use the model, e.g. ``threshold`` on the safety score."""
+    crop_input: InputSpec | None = None
+    """Family fastsam: how a segment goes into the image encoder; None in other families."""
+    logit_scale: float = LOGIT_SCALE
+    """What CLIP multiplies cosine similarities by before a softmax."""
+
+    @property
+    def encoder_input(self) -> InputSpec:
+        """How an image goes into the image encoder."""
+        return self.crop_input or self.input
 
 
 class _Reader:
@@ -81,6 +104,9 @@ class _Reader:
     def refuse(self, key: str, remedy: str) -> BundleError:
         value = self._values.get(key, 'nothing')
         return BundleError(f'{self.where}: {key} is {value!r}; {remedy}')
+
+    def has(self, key: str) -> bool:
+        return key in self._values
 
     def text(self, key: str, choices: tuple[str, ...] = ()) -> str:
         value = self._values.get(key)
@@ -102,6 +128,12 @@ class _Reader:
         if len(numbers) != 3 or (positive and min(numbers) <= 0.0):
             raise self.refuse(key, f'give three {"positive " if positive else ""}numbers, RGB')
         return float(numbers[0]), float(numbers[1]), float(numbers[2])
+
+    def positive(self, key: str, default: float) -> float:
+        value = self._values.get(key, default)
+        if not _is_number(value) or value <= 0.0:
+            raise self.refuse(key, 'give a positive number')
+        return float(value)
 
     def table(self, key: str) -> dict[str, Any]:
         value = self._values.get(key)
@@ -139,6 +171,8 @@ def parse_manifest(raw: bytes, where: str) -> Manifest:
         licence=reader.text('licence'),
         provenance=reader.text('provenance'),
         recommended=_recommended(reader) if 'recommended' in values else MappingProxyType({}),
+        crop_input=_crop_input(reader, family),
+        logit_scale=reader.positive('logit_scale', LOGIT_SCALE),
     )
 
 
@@ -177,15 +211,22 @@ def _roles(reader: _Reader, family: str, files: Mapping[str, FileEntry]) -> Mapp
 
 
 def _input(reader: _Reader, family: str) -> InputSpec:
-    # A heatmap covers the whole frame, so a segmenter must see the whole frame.
-    resizes = ('stretch',) if family == 'clipseg' else RESIZES
     return InputSpec(
         width=reader.whole('width', 1, MAX_INPUT_PX),
         height=reader.whole('height', 1, MAX_INPUT_PX),
-        resize=reader.text('resize', resizes),
+        resize=reader.text('resize', RESIZES_BY_FAMILY[family]),
         mean=reader.triple('mean', positive=False),
         std=reader.triple('std', positive=True),
+        interpolation=reader.text('interpolation', INTERPOLATIONS)
+        if reader.has('interpolation')
+        else 'area',
     )
+
+
+def _crop_input(reader: _Reader, family: str) -> InputSpec | None:
+    if family != 'fastsam':
+        return None
+    return _input(_Reader(f'{reader.where}: crop_input', reader.table('crop_input')), family)
 
 
 def _recommended(reader: _Reader) -> Mapping[str, float]:

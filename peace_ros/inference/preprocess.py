@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from peace_ros.domain import ImageError
+from peace_ros.inference import resample
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -55,6 +56,8 @@ class Preprocessor:
 
     def _resize(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         spec = self._spec
+        if spec.interpolation != 'area':
+            return self._resize_as_pillow(image)
         if spec.resize == 'crop':
             image = _centre(image, spec.width, spec.height)
         height, width = image.shape[:2]
@@ -67,6 +70,20 @@ class Preprocessor:
             np.ascontiguousarray(image), (spec.width, spec.height), interpolation=method
         )
         return resized
+
+    def _resize_as_pillow(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        spec = self._spec
+        width, height = spec.width, spec.height
+        if spec.resize == 'crop':
+            # The reference scales the shorter side, drops the fraction of the longer, then crops.
+            short, long = sorted(image.shape[:2])
+            longer = max(int(width * long / short), width)
+            height, width = (height, longer) if image.shape[0] <= image.shape[1] else (
+                longer, width
+            )  # fmt: skip
+        resized = resample.resize(image, width, height, spec.interpolation)
+        top, left = (height - spec.height) // 2, (width - spec.width) // 2
+        return resized[top : top + spec.height, left : left + spec.width]
 
 
 def _centre(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:

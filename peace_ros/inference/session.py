@@ -12,6 +12,8 @@ from onnxruntime.capi import onnxruntime_pybind11_state as ort_state
 
 from peace_ros.domain import BundleError, ConfigurationError
 from peace_ros.inference.contract import Graph, Tensor, check_graphs
+from peace_ros.inference.openvino_engine import OpenVinoEngine
+from peace_ros.inference.providers import CPU, OPENVINO, check_providers, with_options
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
     from peace_ros.inference.bundle import Bundle
 
-DEFAULT_PROVIDERS = ('CPUExecutionProvider',)
+DEFAULT_PROVIDERS = (CPU,)
 
 # ONNX Runtime's errors have no common base of their own.
 _ORT_ERRORS: tuple[type[Exception], ...] = (
@@ -40,7 +42,12 @@ class Session:
     """One ONNX file, ready to run on the asked-for execution providers."""
 
     def __init__(
-        self, path: Path, *, threads: int = 2, providers: Sequence[str] = DEFAULT_PROVIDERS
+        self,
+        path: Path,
+        *,
+        threads: int = 2,
+        providers: Sequence[str] = DEFAULT_PROVIDERS,
+        checksum: str = '',
     ) -> None:
         """Open a file.
 
@@ -49,39 +56,18 @@ class Session:
             threads: CPU threads of one operator; they sleep between frames instead of spinning,
                 because the other nodes share the same cores.
             providers: names of execution providers, the preferred one first.
+            checksum: SHA-256 of the file, the key of engines that a provider builds and keeps.
 
         Raises:
             ConfigurationError: a provider is not installed or none of them starts.
             BundleError: the file is no graph that ONNX Runtime can run.
         """
         check_providers(providers)
-        options = ort.SessionOptions()
-        options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_ENABLE_ALL
-        options.intra_op_num_threads = threads
-        options.inter_op_num_threads = 1
-        options.add_session_config_entry('session.intra_op.allow_spinning', '0')
-        options.log_severity_level = 3  # errors: warnings about unused initialisers help nobody
-        try:
-            self._session = ort.InferenceSession(str(path), options, providers=list(providers))
-        except _ORT_ERRORS as error:
-            raise BundleError(
-                f'{path}: ONNX Runtime {ort.__version__} cannot open it ({error}); '
-                'export the model again'
-            ) from error
-        self.providers: tuple[str, ...] = tuple(self._session.get_providers())
-        """The execution providers in use; ONNX Runtime adds the CPU as the last."""
-        if not set(providers) & set(self.providers):
-            raise ConfigurationError(
-                f'execution provider {", ".join(providers)} did not start for {path}, only '
-                f'{", ".join(self.providers)}; check its driver or add CPUExecutionProvider'
-            )
+        engine = _openvino if providers[0] == OPENVINO else _onnxruntime
+        self._engine, self.graph, self.providers = engine(path, threads, tuple(providers), checksum)
+        """``providers``: those in use; ONNX Runtime adds the CPU as the last."""
         self.calls = 0
         """Runs since it was opened, without warm-ups."""
-        self.graph = Graph(
-            path,
-            tuple(_tensor(each) for each in self._session.get_inputs()),
-            tuple(_tensor(each) for each in self._session.get_outputs()),
-        )
 
     def run(
         self, outputs: Sequence[str], feeds: Mapping[str, NDArray[Any]]
@@ -100,7 +86,7 @@ class Session:
         self, outputs: Sequence[str], feeds: Mapping[str, NDArray[Any]]
     ) -> list[NDArray[np.float32]]:
         try:
-            arrays = self._session.run(list(outputs), dict(feeds))
+            arrays = self._engine.run(list(outputs), feeds)
         except _ORT_ERRORS as error:
             shapes = {name: array.shape for name, array in feeds.items()}
             raise BundleError(
@@ -108,18 +94,6 @@ class Session:
                 'export the model again'
             ) from error
         return cast('list[NDArray[np.float32]]', arrays)
-
-
-def check_providers(providers: Sequence[str]) -> None:
-    """Raise ConfigurationError when an execution provider is not part of this ONNX Runtime."""
-    available = ort.get_available_providers()
-    missing = [name for name in providers if name not in available]
-    if missing or not providers:
-        raise ConfigurationError(
-            f'execution provider {", ".join(missing) or "list is empty"}: this ONNX Runtime '
-            f'{ort.__version__} has {", ".join(available)}; choose among them or install a build '
-            'that has it'
-        )
 
 
 def open_sessions(
@@ -134,10 +108,83 @@ def open_sessions(
     Raises BundleError or ConfigurationError.
     """
     sessions = {
-        role: Session(bundle.paths[role], threads=threads, providers=providers) for role in roles
+        role: Session(
+            bundle.paths[role],
+            threads=threads,
+            providers=providers,
+            checksum=bundle.manifest.files[bundle.manifest.roles[role]].sha256,
+        )
+        for role in roles
     }
     check_graphs(bundle.manifest, {role: each.graph for role, each in sessions.items()})
     return MappingProxyType(sessions)
+
+
+class _OnnxRuntimeEngine:
+    """ONNX Runtime, running only what the asked-for outputs need."""
+
+    def __init__(self, session: Any) -> None:
+        self._session = session
+        self._options = ort.RunOptions()
+        self._options.only_execute_path_to_fetches = True
+
+    def run(self, outputs: list[str], feeds: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:
+        arrays = self._session.run(outputs, dict(feeds), self._options)
+        return cast('list[NDArray[Any]]', arrays)
+
+
+_Opened = tuple[_OnnxRuntimeEngine | OpenVinoEngine, Graph, tuple[str, ...]]
+
+
+def _onnxruntime(path: Path, threads: int, providers: tuple[str, ...], checksum: str) -> _Opened:
+    options = ort.SessionOptions()
+    options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_ENABLE_ALL
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.add_session_config_entry('session.intra_op.allow_spinning', '0')
+    options.log_severity_level = 3  # errors: warnings about unused initialisers help nobody
+    try:
+        session = ort.InferenceSession(
+            str(path), options, providers=with_options(providers, checksum)
+        )
+    except _ORT_ERRORS as error:
+        raise BundleError(
+            f'{path}: ONNX Runtime {ort.__version__} cannot open it ({error}); '
+            'export the model again'
+        ) from error
+    in_use = tuple(session.get_providers())
+    if not set(providers) & set(in_use):
+        raise ConfigurationError(
+            f'execution provider {", ".join(providers)} did not start for {path}, only '
+            f'{", ".join(in_use)}; check its driver or add CPUExecutionProvider'
+        )
+    graph = Graph(
+        path,
+        tuple(_tensor(each) for each in session.get_inputs()),
+        tuple(_tensor(each) for each in session.get_outputs()),
+    )
+    return _OnnxRuntimeEngine(session), graph, in_use
+
+
+def _openvino(
+    path: Path,
+    threads: int,
+    providers: tuple[str, ...],  # noqa: ARG001 - the signature of an opener
+    checksum: str,  # noqa: ARG001
+) -> _Opened:
+    try:
+        engine = OpenVinoEngine(path, threads)
+    except RuntimeError as error:
+        raise BundleError(
+            f'{path}: OpenVINO cannot open it ({error}); export the model again'
+        ) from error
+    inputs, outputs = engine.signature()
+    graph = Graph(
+        path,
+        tuple(Tensor(*each) for each in inputs),
+        tuple(Tensor(*each) for each in outputs),
+    )
+    return engine, graph, (OPENVINO,)
 
 
 def _tensor(node: Any) -> Tensor:

@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+import html
 import logging
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import ftfy
 import numpy as np
 import tokenizers
 
@@ -18,6 +21,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+END_OF_WORD = '</w>'
+"""How CLIP's byte-pair encoding marks the end of a word; no other tokenizer here does."""
 
 _LOG = logging.getLogger(__name__)
 
@@ -50,6 +56,8 @@ class Tokenizer:
         )
         self._tokenizer.enable_truncation(context_length)
         self._unknown_id = _unknown_id(self._tokenizer)
+        model = self._tokenizer.model
+        self._cleans = getattr(model, 'end_of_word_suffix', None) == END_OF_WORD
         self._reported: set[str] = set()
 
     def __call__(self, texts: Sequence[str]) -> Tokens:
@@ -59,7 +67,7 @@ class Tokenizer:
         """
         if not texts or not all(text.strip() for text in texts):
             raise ConfigurationError(f'texts to encode {list(texts)}: give non-blank texts')
-        encodings = self._tokenizer.encode_batch(list(texts))
+        encodings = self._tokenizer.encode_batch([self._cleaned(text) for text in texts])
         for text, encoding in zip(texts, encodings, strict=True):
             if encoding.overflowing and text not in self._reported:
                 self._reported.add(text)
@@ -74,17 +82,30 @@ class Tokenizer:
             np.array([each.attention_mask for each in encodings], np.int64),
         )
 
+    def _cleaned(self, text: str) -> str:
+        return clean_for_clip(text) if self._cleans else text
+
     def unknown_words(self, text: str) -> tuple[str, ...]:
         """Return the words of a text that the model has never learned, as they are written.
 
         Empty for tokenizers that spell unknown words out in smaller pieces.
         """
-        if self._unknown_id is None:
+        if self._unknown_id is None or self._cleans:
             return ()
         encoding = self._tokenizer.encode(text)
         spans = zip(encoding.ids, encoding.offsets, strict=True)
         found = [text[start:end] for token, (start, end) in spans if token == self._unknown_id]
         return tuple(dict.fromkeys(found))
+
+
+def clean_for_clip(text: str) -> str:
+    """Return a text as OpenAI's CLIP cleans it before it splits it into words.
+
+    Broken encodings, curly quotes and HTML entities are undone, white space becomes single
+    blanks, capitals small.
+    """
+    fixed = html.unescape(html.unescape(ftfy.fix_text(text)))
+    return re.sub(r'\s+', ' ', fixed).strip().lower()
 
 
 def _unknown_id(tokenizer: tokenizers.Tokenizer) -> int | None:

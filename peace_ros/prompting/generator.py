@@ -63,6 +63,14 @@ class PromptingParameters:
         low=0.0,
         high=0.99,
     )
+    interval_s: float = parameter(
+        0.0,
+        'Shortest time between two rankings, by the stamps of the frames; those in between keep '
+        'the prompt. 0 ranks every frame; a full-size CLIP on a CPU wants 2',
+        unit='s',
+        low=0.0,
+        high=60.0,
+    )
     threads: int = parameter(2, 'CPU threads of the networks', low=1, high=64)
     providers: tuple[str, ...] = parameter(
         ('CPUExecutionProvider',), 'ONNX Runtime execution providers, the preferred one first'
@@ -140,6 +148,8 @@ class PromptGenerator:
         self._encoder = encoder
         self._categories: dict[str, _Category] = {}
         self._newest_stamp_ns: int | None = None
+        self._ranked: Prompt | None = None
+        """The prompt of the last frame that was ranked."""
         names = categories_of(self._sentence)
         if not names:
             return
@@ -166,20 +176,30 @@ class PromptGenerator:
     def reset(self) -> None:
         """Forget the frames so far; the next one is ranked on its own."""
         self._newest_stamp_ns = None
+        self._ranked = None
         for category in self._categories.values():
             category.reset()
 
     def generate(self, frame: Frame) -> Prompt:
         """Return the prompt for a frame, with its stamp and the similarity of every word.
 
-        A stamp before that of the last frame begins a new sequence. Raises ImageError when the
-        encoder cannot take the image, BundleError when its answer cannot be used.
+        Between two rankings (parameter ``interval_s``) it is the last one's, words and scores
+        alike. A stamp before that of the last frame begins a new sequence. Raises ImageError when
+        the encoder cannot take the image, BundleError when its answer cannot be used.
         """
         if self._encoder is None or not self._categories:
             return Prompt(self._sentence, frame.stamp_ns)
         if self._newest_stamp_ns is not None and frame.stamp_ns < self._newest_stamp_ns:
             self.reset()
-        image = self._encoder.image_embedding(frame)
+        self._newest_stamp_ns = frame.stamp_ns
+        interval_ns = self._parameters.interval_s * 1e9
+        if self._ranked is not None and frame.stamp_ns < self._ranked.stamp_ns + interval_ns:
+            return Prompt(self._ranked.template, frame.stamp_ns, self._ranked.ranking)
+        self._ranked = self._rank(self._encoder, frame)
+        return self._ranked
+
+    def _rank(self, encoder: Encoder, frame: Frame) -> Prompt:
+        image = encoder.image_embedding(frame)
         sentence = self._sentence
         ranking = {}
         for name, category in self._categories.items():
@@ -187,7 +207,6 @@ class PromptGenerator:
             words = category.choose(scores, self._parameters.margin)
             sentence = sentence.replace('{' + name + '}', ', '.join(words))
             ranking[name] = _ranked(category.words, scores)
-        self._newest_stamp_ns = frame.stamp_ns
         return Prompt(sentence, frame.stamp_ns, ranking)
 
 

@@ -3,6 +3,7 @@
 """From a frame and its prompt to the safety of each pixel."""
 
 from peace_ros.segmentation.clipseg import ClipSegSegmenter
+from peace_ros.segmentation.fastsam import FastSamSegmenter
 from peace_ros.segmentation.fusion import FUSIONS, Fusion, set_difference, soft_difference
 from peace_ros.segmentation.overlay import draw_overlay
 from peace_ros.segmentation.registry import FACTORIES, create_segmenter
@@ -14,6 +15,7 @@ __all__ = [
     'FAMILIES',
     'FUSIONS',
     'ClipSegSegmenter',
+    'FastSamSegmenter',
     'Fusion',
     'SegmentationParameters',
     'Segmenter',

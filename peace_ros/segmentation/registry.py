@@ -11,6 +11,7 @@ from types import MappingProxyType
 from peace_ros.domain import ConfigurationError
 from peace_ros.inference import Bundle
 from peace_ros.segmentation.clipseg import ClipSegSegmenter
+from peace_ros.segmentation.fastsam import FastSamSegmenter
 from peace_ros.segmentation.segmenter import SegmentationParameters, Segmenter
 from peace_ros.segmentation.terms import Terms
 
@@ -23,16 +24,9 @@ def _clipseg(bundle: BundleOrName, terms: Terms, parameters: SegmentationParamet
     return ClipSegSegmenter(loaded, terms, parameters)
 
 
-def _fastsam(
-    bundle: BundleOrName,
-    terms: Terms,  # noqa: ARG001 - a factory's signature
-    parameters: SegmentationParameters,  # noqa: ARG001
-) -> Segmenter:
-    name = bundle.manifest.name if isinstance(bundle, Bundle) else bundle
-    raise ConfigurationError(
-        f'segmentation family fastsam (bundle {name}): its model is not part of this version; '
-        'choose a CS preset (DD-CS, D-CS or PEACE-CS) or family clipseg'
-    )
+def _fastsam(bundle: BundleOrName, terms: Terms, parameters: SegmentationParameters) -> Segmenter:
+    loaded = bundle if isinstance(bundle, Bundle) else Bundle.load(bundle)
+    return FastSamSegmenter(loaded, terms, parameters)
 
 
 FACTORIES: Mapping[str, Factory] = MappingProxyType({'clipseg': _clipseg, 'fastsam': _fastsam})
@@ -50,7 +44,7 @@ def create_segmenter(
         parameters: of the segmentation.
 
     Raises:
-        ConfigurationError: the family is unknown or has no model in this version.
+        ConfigurationError: the family is unknown or the parameters do not fit it.
         BundleError: the bundle cannot be used.
     """
     factory = FACTORIES.get(family)

@@ -6,12 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from peace_ros.domain import ConfigurationError
-from peace_ros.resources import config_dir
+from peace_ros.word_lists import find_word_lists, read_word_lists
 
 SHIPPED_NAME = 'terms.yaml'
 MOST_TERMS = 128
@@ -70,39 +67,12 @@ def load_terms(path: Path | str = SHIPPED_NAME) -> Terms:
 
     Raises ConfigurationError that names the file, the term and what to do.
     """
-    found = Path(path).expanduser()
-    if not found.exists() and found.name == str(path):
-        found = config_dir() / found.name
+    found = find_word_lists(path)
+    lists = read_word_lists(found, _SIDES)
     try:
-        text = found.read_text(encoding='utf-8')
-        # The two readings differ in one thing: compose() keeps a key that is there twice.
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-        document = yaml.safe_load(text)
-    except OSError as error:
-        raise ConfigurationError(
-            f'terms {found}: {error.strerror}; give a YAML file with positive and negative terms'
-        ) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f'terms {found}: not YAML ({error}); correct it') from error
-    sides = [key.value for key, _ in node.value] if isinstance(node, yaml.MappingNode) else []
-    if sorted(sides) != sorted(_SIDES):
-        raise ConfigurationError(
-            f'terms {found}: has {", ".join(map(str, sides)) or "no lists"}; '
-            'give the lists positive and negative, each once'
-        )
-    try:
-        return Terms(_strings(document['positive']), _strings(document['negative']))
+        return Terms(**lists)
     except ConfigurationError as error:
-        raise ConfigurationError(f'terms {found}: {error}') from error
-
-
-def _strings(values: Any) -> tuple[str, ...]:
-    if not isinstance(values, list):
-        raise ConfigurationError(f'{values!r} where a list of terms is needed ([] for none)')
-    for value in values:
-        if not isinstance(value, str):
-            raise ConfigurationError(f'{value!r} is no text; put it in quotes')
-    return tuple(values)
+        raise ConfigurationError(f'{found}: {error}') from error
 
 
 def _tidy(term: str) -> str:

@@ -30,11 +30,6 @@ def test_clipseg_is_made_from_a_bundle_or_its_folder(clipseg_folder: Path) -> No
         assert segmenter.terms is TERMS
 
 
-def test_fastsam_refuses_with_a_way_out() -> None:
-    with pytest.raises(ConfigurationError, match='not part of this version; choose a CS preset'):
-        create_segmenter('fastsam', 'fastsam-s', TERMS, PARAMETERS)
-
-
 def test_an_unknown_family_lists_the_known_ones() -> None:
     with pytest.raises(ConfigurationError, match="'sam2' is unknown: choose one of clipseg"):
         create_segmenter('sam2', 'x', TERMS, PARAMETERS)

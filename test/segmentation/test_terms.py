@@ -60,29 +60,14 @@ def test_negative_terms_may_be_absent(tmp_path: Path) -> None:
         ('positive: [grass, GRASS]\nnegative: [car]\n', "'grass' is there twice"),
         ('positive: [grass]\nnegative: ["car, car"]\n', "'car' is there twice"),
         ('positive: [no]\nnegative: []\n', 'False is no text'),
-        ('positive: [grass, 3]\nnegative: []\n', '3 is no text'),
-        ('positive: grass\nnegative: []\n', 'a list of terms'),
         ('positive: ["grass, "]\nnegative: []\n', 'empty places'),
         ('positive: [""]\nnegative: []\n', 'empty places'),
         ('positive: ["{term}"]\nnegative: []\n', 'without braces'),
         ('positive: [grass]\n', 'give the lists'),
         ('positive: [grass]\nnegative: [car]\nneutral: [sky]\n', 'neutral; give the lists'),
-        ('positive: [grass]\nnegative: [car]\nnegative: [tree]\n', 'each once'),
-        ('[grass]\n', 'no lists'),
-        ('', 'no lists'),
-        ('positive: [grass', 'not YAML'),
         (f'positive: {[f"w{i}" for i in range(200)]}\nnegative: []\n', '200 terms: at most 128'),
     ],
 )
 def test_bad_files_are_refused(tmp_path: Path, text: str, says: str) -> None:
     with pytest.raises(ConfigurationError, match=rf'terms\.yaml: .*{says}'):
         load_terms(write(tmp_path, text))
-
-
-def test_a_missing_or_binary_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match=r'none\.yaml: No such file'):
-        load_terms(tmp_path / 'none.yaml')
-    binary = tmp_path / 'binary.yaml'
-    binary.write_bytes(b'\xff\xfe\x00')
-    with pytest.raises(ConfigurationError, match=r'binary\.yaml: not YAML'):
-        load_terms(binary)

@@ -1,0 +1,196 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A checkpoint becomes a bundle only when the bundle answers as torch does.
+
+Ultralytics (AGPL-3.0) is not needed: a network with the same outputs stands in for what it reads.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import onnx
+import pytest
+from onnx import helper, numpy_helper
+
+from peace_ros.domain import BundleError, ConfigurationError, Frame, Prompt
+from peace_ros.inference import Bundle
+from peace_ros.inference.session import Session
+from peace_ros.segmentation import SegmentationParameters, Terms, create_segmenter
+
+torch = pytest.importorskip('torch')
+pytestmark = pytest.mark.training
+
+SIDE_PX, MASKS = 64, 4
+TERMS = Terms(('grass', 'park'), ('road', 'car'))
+PROMPT = Prompt('A rendered image of {term} in spring.', 0)
+
+
+class _Head(torch.nn.Module):
+    def __init__(self, classes: int, masks: int) -> None:
+        super().__init__()
+        self.nc, self.nm, self.export, self.format = classes, masks, False, ''
+        self.found = torch.nn.Conv2d(6, 5 + masks, 8, 8)
+        self.shapes = torch.nn.Conv2d(6, masks, 1)
+        with torch.no_grad():  # answers that differ from place to place
+            self.found.weight.mul_(6.0)
+            self.shapes.weight.mul_(6.0)
+
+    def forward(self, features: Any) -> Any:
+        rows = self.found(features).flatten(2)
+        boxes = rows[:, :4].sigmoid() * SIDE_PX
+        found = torch.cat([boxes, rows[:, 4:5].sigmoid(), rows[:, 5:]], 1)
+        return (found, self.shapes(features)) if self.export else ((found, None), {})
+
+
+class _Network(torch.nn.Module):
+    def __init__(self, classes: int = 1, masks: int = MASKS) -> None:
+        super().__init__()
+        torch.manual_seed(1)
+        self.model = torch.nn.ModuleList([torch.nn.Conv2d(3, 6, 4, 4), _Head(classes, masks)])
+
+    def fuse(self, verbose: bool = True) -> Any:
+        return self
+
+    def forward(self, pixels: Any) -> Any:
+        return self.model[1](torch.relu(self.model[0](pixels)))
+
+
+@pytest.fixture
+def network(monkeypatch: pytest.MonkeyPatch) -> Any:
+    made = SimpleNamespace(model=_Network())
+    monkeypatch.setitem(sys.modules, 'ultralytics', SimpleNamespace(YOLO=lambda path: made))
+    return made
+
+
+@pytest.fixture
+def checkpoint(tmp_path: Path) -> Path:
+    path = tmp_path / 'FastSAM-s.pt'
+    path.write_bytes(b'weights')
+    return path
+
+
+@pytest.fixture
+def clip(clip_folder: Path) -> Bundle:
+    return Bundle.load(clip_folder)
+
+
+def export(*args: Any, **options: Any) -> Bundle:
+    from peace_ros.inference.export.fastsam import export_fastsam
+
+    return export_fastsam(*args, side_px=SIDE_PX, **options)
+
+
+def test_the_bundle_runs_and_says_its_licence(
+    network: Any, checkpoint: Path, clip: Bundle, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING):
+        bundle = export(checkpoint, clip, tmp_path / 'out' / 'fastsam-s')
+    assert 'AGPL-3.0' in caplog.text
+    assert 'AGPL-3.0' in bundle.manifest.licence
+    parameters = SegmentationParameters(
+        threads=1,
+        fastsam_min_confidence=0.0,
+        fastsam_min_stability=0.0,
+        fastsam_min_area=0.0,
+        fastsam_max_segments=300,
+    )
+    segmenter = create_segmenter('fastsam', bundle, TERMS, parameters)
+    rng = np.random.default_rng(3)
+    maps = segmenter.term_maps(Frame(rng.integers(0, 256, (48, 64, 3), np.uint8), 7), PROMPT)
+    assert maps.shape == (4, 48, 64)
+    assert maps.sum(axis=0).max() == pytest.approx(1.0, abs=1e-5)
+    assert segmenter.calls == {'segmenter': 1, 'image_encoder': 1, 'text_encoder': 1}
+
+
+def test_a_network_that_changes_on_the_way_is_refused_and_the_old_bundle_stays(
+    network: Any, checkpoint: Path, clip: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from peace_ros.inference.export import fastsam
+
+    folder = tmp_path / 'fastsam-s'
+    before = export(checkpoint, clip, folder).checksum
+    write = fastsam._write_segmenter
+
+    def damage(model: Any, path: Path, side_px: int) -> None:
+        write(model, path, side_px)
+        graph = onnx.load(str(path))
+        for tensor in graph.graph.initializer:
+            if tensor.data_type == onnx.TensorProto.FLOAT:
+                values = numpy_helper.to_array(tensor) * np.float32(1.01)
+                tensor.CopyFrom(numpy_helper.from_array(values, tensor.name))
+        onnx.save(graph, str(path))
+
+    monkeypatch.setattr(fastsam, '_write_segmenter', damage)
+    with pytest.raises(BundleError, match='differ from the reference'):
+        export(checkpoint, clip, folder)
+    assert Bundle.load(folder).checksum == before
+    assert sorted(each.name for each in tmp_path.iterdir() if each.name.startswith('.')) == []
+
+
+@pytest.mark.parametrize(('classes', 'masks'), [(80, 4), (1, 0)])
+def test_another_network_is_refused(
+    network: Any, checkpoint: Path, clip: Bundle, tmp_path: Path, classes: int, masks: int
+) -> None:
+    network.model = _Network(classes, masks)
+    with pytest.raises(BundleError, match=r'give FastSAM-s\.pt'):
+        export(checkpoint, clip, tmp_path / 'x')
+    assert not (tmp_path / 'x').exists()
+
+
+def test_without_ultralytics_there_is_a_way_out(
+    checkpoint: Path, clip: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, 'ultralytics', None)
+    with pytest.raises(ConfigurationError, match=r'pip install ultralytics.*AGPL-3\.0'):
+        export(checkpoint, clip, tmp_path / 'x')
+
+
+def test_a_missing_checkpoint_is_not_looked_for_on_the_network(
+    network: Any, clip: Bundle, tmp_path: Path
+) -> None:
+    with pytest.raises(BundleError, match='no such file'):
+        export(tmp_path / 'FastSAM-s.pt', clip, tmp_path / 'x')
+
+
+def test_a_class_token_is_repeated_for_every_image(tmp_path: Path) -> None:
+    from peace_ros.inference.export.fastsam import free_batch
+
+    rng = np.random.default_rng(0)
+    node = helper.make_node
+    graph = helper.make_graph(
+        [
+            node('Conv', ['pixel_values', 'kernel'], ['patches'], strides=[4, 4]),
+            node('Reshape', ['patches', 'columns'], ['flat']),
+            node('Transpose', ['flat'], ['tokens'], perm=[0, 2, 1]),
+            node('Concat', ['class', 'tokens'], ['joined'], axis=1),
+            node('Softmax', ['joined'], ['bent'], axis=1),
+            node('ReduceMean', ['bent'], ['image_embedding'], axes=[1], keepdims=0),
+        ],
+        'image',
+        [helper.make_tensor_value_info('pixel_values', onnx.TensorProto.FLOAT, [1, 3, 16, 16])],
+        [helper.make_tensor_value_info('image_embedding', onnx.TensorProto.FLOAT, [1, 5])],
+        [
+            numpy_helper.from_array(rng.normal(size=(5, 3, 4, 4)).astype(np.float32), 'kernel'),
+            numpy_helper.from_array(rng.normal(size=(1, 1, 5)).astype(np.float32), 'class'),
+            numpy_helper.from_array(np.array([1, 5, 16], np.int64), 'columns'),
+        ],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid('', 17)])
+    model.ir_version = 8
+    onnx.save(model, str(tmp_path / 'one.onnx'))
+    free_batch(model)
+    onnx.checker.check_model(model)
+    onnx.save(model, str(tmp_path / 'many.onnx'))
+    images = rng.normal(size=(7, 3, 16, 16)).astype(np.float32)
+    one, many = (Session(tmp_path / f'{name}.onnx', threads=1) for name in ('one', 'many'))
+    (together,) = many.run(['image_embedding'], {'pixel_values': images})
+    assert together.std(axis=0).min() > 0.0
+    for image, embedding in zip(images, together, strict=True):
+        (alone,) = one.run(['image_embedding'], {'pixel_values': image[None]})
+        np.testing.assert_allclose(embedding, alone[0], atol=1e-6)
