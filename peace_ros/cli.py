@@ -116,7 +116,7 @@ def demo(
     ] = None,
     run_dir: Annotated[
         Path | None,
-        typer.Option(metavar='DIR', help='Empty or new folder for the results.'),
+        typer.Option(metavar='DIR', help='Empty or new folder; default runs/<time>-seed<seed>.'),
     ] = None,
     timeout: Annotated[
         float, typer.Option(metavar='S', help='Seconds that the landing may take.')
@@ -163,7 +163,7 @@ def replay(
     config: Annotated[str, typer.Option(metavar='PRESET', help='Preset or file.')] = 'peace_cs',
     out: Annotated[
         Path | None,
-        typer.Option(metavar='DIR', help='Empty or new folder; default <source>_replay.'),
+        typer.Option(metavar='DIR', help='Empty or new folder; default runs/<source>_replay.'),
     ] = None,
     fov: Annotated[
         float | None,

@@ -29,6 +29,8 @@ def main() -> None:
     """Guard this process, then run the module as ``python -m`` would."""
     parent_pid, module, *arguments = sys.argv[1:]
     die_with_parent(int(parent_pid))
+    # Python would answer Ctrl-C with a traceback until the node has a handler of its own.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     sys.argv = [module, *arguments]
     runpy.run_module(module, run_name='__main__', alter_sys=True)
 

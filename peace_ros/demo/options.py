@@ -10,6 +10,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from peace_ros.domain import ConfigurationError, VehicleError
+from peace_ros.recording.run_folder import create_run_folder
 
 DEFAULT_TIMEOUT_S = 280.0
 _SPEED_LIMITS = (0.1, 10.0)
@@ -38,6 +39,7 @@ class DemoOptions:
     pose_mavlink: str | None = None
     """URL on which the camera hears the pose of that autopilot."""
     run_dir: Path | None = None
+    """Folder of the results; None: ``runs/<time>-seed<seed>`` where the user stands."""
     timeout_s: float = DEFAULT_TIMEOUT_S
     """Wall clock, from the engagement."""
 
@@ -112,17 +114,7 @@ class DemoOptions:
 
         """
         now = datetime.now(timezone.utc).strftime('%Y%m%d-%H%M%S')
-        folder = self.run_dir or Path('peace_runs') / f'{now}-seed{self.seed}'
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            occupied = any(folder.iterdir())
-        except OSError as error:
-            raise ConfigurationError(
-                f'run folder {folder} cannot be used ({error}): give --run-dir DIR'
-            ) from error
-        if occupied:
-            raise ConfigurationError(f'run folder {folder} is not empty: give another --run-dir')
-        return folder.resolve()
+        return create_run_folder(self.run_dir, f'{now}-seed{self.seed}', '--run-dir')
 
 
 def parse_start(text: str) -> tuple[float, float]:

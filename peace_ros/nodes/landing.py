@@ -34,7 +34,7 @@ from peace_ros.nodes.qos import IMAGE_IN, RESULT
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.status import Situation, status_message
 from peace_ros.nodes.vehicle_access import VehicleAccess
-from peace_ros.vehicle import SenderParameters, SetpointSender, VehicleParameters
+from peace_ros.vehicle import SenderParameters, SetpointSender, VehicleLink, VehicleParameters
 
 PARAMETERS: tuple[Group, ...] = (
     ('', LandingOptions),
@@ -69,6 +69,7 @@ class LandingNode(PeaceNode):
         """Guards the core: the engage service runs beside the timer."""
         self._heatmaps: deque[Image] = deque(maxlen=4)
         self._sender: SetpointSender | None = None
+        self._closed = False
         self._state = State.IDLE
         self._status_due_s = 0.0
         self._auto_engage_due = self._options.auto_engage
@@ -171,12 +172,13 @@ class LandingNode(PeaceNode):
         problem = self._reason_against()
         link = self._access.link
         if not problem and link is not None:
-            result = link.request_control(by_person=by_person)
-            problem = '' if result else f'control {result.answer.value}: {result.reason}'
+            problem = _ask_for_control(link, by_person=by_person)
         if problem or link is None:
             self.get_logger().warning(f'not engaged: {problem}')
             return False, problem
         with self._lock:
+            if self._closed:
+                return False, 'the node is ending'
             if self._sender is None:
                 self._sender = SetpointSender(link, parameters=self.filled(SenderParameters))
                 self._sender.start()
@@ -203,10 +205,20 @@ class LandingNode(PeaceNode):
     def close(self) -> None:
         """Leave the vehicle standing: zero velocity, then silence."""
         with self._lock:
+            self._closed = True
             if self._sender is not None:
                 self._sender.stop()
                 self._access.stop_vehicle()
         self._access.close()
+
+
+def _ask_for_control(link: VehicleLink, *, by_person: bool) -> str:
+    """Return why the vehicle does not obey, empty when it does."""
+    try:
+        result = link.request_control(by_person=by_person)
+    except VehicleError as error:
+        return str(error)
+    return '' if result else f'control {result.answer.value}: {result.reason}'
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -22,13 +22,11 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from peace_ros.domain import (
     Camera,
-    ConfigurationError,
     Frame,
     Heatmap,
     ImageError,
     Pose,
     Prompt,
-    RankedWord,
     Setpoint,
     Site,
     VehicleError,
@@ -40,12 +38,8 @@ from peace_ros.domain.geometry import (
     ned_to_enu,
     yaw_from_quaternion,
 )
-from peace_ros.nodes.images import (
-    jpeg_from_rgb,
-    pixels_from_raw,
-    rgb_from_compressed,
-    rgb_from_raw,
-)
+from peace_ros.images import jpeg_from_rgb, pixels_from_raw, rgb_from_message
+from peace_ros.prompting.pairs import prompt_from_pairs, prompt_pairs
 
 NANOSECONDS = 1_000_000_000
 LOCAL_FRAME = 'map'
@@ -56,10 +50,6 @@ CAMERA_FRAME = 'camera'
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
 ERROR = DiagnosticStatus.ERROR
-
-_BEST = 'best'
-_SCORE = 'score'
-_TEMPLATE = 'template'
 
 
 def time_from_ns(stamp_ns: int) -> Time:
@@ -80,10 +70,7 @@ def stamp_ns(message: Any) -> int:
 
 def frame_from_message(message: Image | CompressedImage) -> Frame:
     """Return the RGB frame of a raw or compressed image; ImageError says what is wrong with it."""
-    if isinstance(message, CompressedImage):
-        return Frame(rgb_from_compressed(message.format, message.data), stamp_ns(message))
-    rgb = rgb_from_raw(message.encoding, message.width, message.height, message.step, message.data)
-    return Frame(rgb, stamp_ns(message))
+    return Frame(rgb_from_message(message), stamp_ns(message))
 
 
 def image_message(
@@ -147,44 +134,14 @@ def diagnostic_values(message: DiagnosticArray) -> dict[str, str]:
 
 
 def prompt_to_message(prompt: Prompt) -> DiagnosticArray:
-    """Return a prompt as diagnostics, its template as the sentence.
-
-    Per category there is its best word (``best/environment``) and the score of each word
-    (``score/environment/spring``), best first.
-    """
-    values = [(_TEMPLATE, prompt.template)]
-    for category, ranking in prompt.ranking.items():
-        values.extend((f'{_BEST}/{category}', best.word) for best in ranking[:1])
-        values.extend((f'{_SCORE}/{category}/{each.word}', f'{each.score:.4f}') for each in ranking)
-    return diagnostic_array(prompt.stamp_ns, 'prompt', OK, prompt.template, values)
+    """Return a prompt as diagnostics, its template as the sentence."""
+    pairs = prompt_pairs(prompt).items()
+    return diagnostic_array(prompt.stamp_ns, 'prompt', OK, prompt.template, pairs)
 
 
 def prompt_from_message(message: DiagnosticArray) -> Prompt:
     """Return the prompt of its diagnostics; ConfigurationError when it holds none."""
-    template = ''
-    ranking: dict[str, list[RankedWord]] = {}
-    for status in message.status:
-        for pair in status.values:
-            kind, _, rest = pair.key.partition('/')
-            if pair.key == _TEMPLATE:
-                template = pair.value
-            elif kind == _SCORE:
-                category, _, word = rest.partition('/')
-                ranking.setdefault(category, []).append(RankedWord(word, _score(pair)))
-    if not template:
-        raise ConfigurationError(
-            'prompt message without the key "template": connect the topic of a prompt_generator'
-        )
-    return Prompt(template, stamp_ns(message), {key: tuple(of) for key, of in ranking.items()})
-
-
-def _score(pair: KeyValue) -> float:
-    try:
-        return float(pair.value)
-    except ValueError as error:
-        raise ConfigurationError(
-            f'prompt message with {pair.key} = {pair.value!r}: a score is a number'
-        ) from error
+    return prompt_from_pairs(diagnostic_values(message), stamp_ns(message))
 
 
 def pose_to_message(pose: Pose, frame_id: str = LOCAL_FRAME) -> PoseStamped:

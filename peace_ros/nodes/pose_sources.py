@@ -56,6 +56,7 @@ class MavlinkSource:
 
     def __init__(self, node: PeaceNode, sink: Sink, url: str) -> None:
         self._sink = sink
+        self._output = _PoseOutput(node)
         parameters = VehicleParameters(system_id=_CAMERA_SYSTEM_ID)
 
         def open_link() -> MavlinkLink:
@@ -68,6 +69,7 @@ class MavlinkSource:
     def _poll(self) -> None:
         link = self._connection.link
         for pose in () if link is None else link.take_poses():
+            self._output.publish(pose)
             self._sink(pose)
 
     def close(self) -> None:
@@ -76,16 +78,12 @@ class MavlinkSource:
 
 
 class TwistSource:
-    """Velocities on ``cmd_vel``, integrated here; publishes ``pose``, and tf where there is tf."""
+    """Velocities on ``cmd_vel``, integrated here."""
 
     def __init__(self, node: PeaceNode, sink: Sink, altitude_m: float, timeout_s: float) -> None:
         self._node, self._sink = node, sink
+        self._output = _PoseOutput(node)
         self._vehicle = TwistVehicle(altitude_m, timeout_s)
-        self._pose_out = node.create_publisher(PoseStamped, 'pose', POSE)
-        self._tf_message = _tf_message()
-        self._tf_out = None
-        if self._tf_message is not None:
-            self._tf_out = node.create_publisher(self._tf_message, '/tf', POSE)
         node.create_subscription(Twist, 'cmd_vel', self._on_twist, COMMAND)
         node.create_timer(1.0 / _INTEGRATION_HZ, self._advance)
 
@@ -98,14 +96,28 @@ class TwistSource:
 
     def _advance(self) -> None:
         pose = self._vehicle.advance(self._node.clock_ns(), time.monotonic())
-        self._pose_out.publish(pose_to_message(pose))
-        if self._tf_out is not None and self._tf_message is not None:
-            transforms = [transform_from_pose(pose, BODY_FRAME)]
-            self._tf_out.publish(self._tf_message(transforms=transforms))
+        self._output.publish(pose)
         self._sink(pose)
 
     def close(self) -> None:
         """Nothing to release."""
+
+
+class _PoseOutput:
+    """A pose that no topic carries yet: on ``pose`` (ENU, FLU), and on tf where there is tf."""
+
+    def __init__(self, node: PeaceNode) -> None:
+        self._pose_out = node.create_publisher(PoseStamped, 'pose', POSE)
+        self._tf_message = _tf_message()
+        self._tf_out = None
+        if self._tf_message is not None:
+            self._tf_out = node.create_publisher(self._tf_message, '/tf', POSE)
+
+    def publish(self, pose: Pose) -> None:
+        self._pose_out.publish(pose_to_message(pose))
+        if self._tf_out is not None and self._tf_message is not None:
+            transforms = [transform_from_pose(pose, BODY_FRAME)]
+            self._tf_out.publish(self._tf_message(transforms=transforms))
 
 
 PoseSource = TopicSource | MavlinkSource | TwistSource

@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from queue import SimpleQueue
 from types import FrameType
 from typing import Any, TypeVar
 
@@ -21,6 +24,7 @@ from rclpy.executors import (
 )
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 from peace_ros.domain import ConfigurationError, PeaceError
 from peace_ros.nodes.parameters import Group, declare_parameters, refuse_unknown
@@ -54,8 +58,8 @@ class PeaceNode(Node):  # type: ignore[misc]
             raise
         self.failure: Exception | None = None
         """The defect of ours that ended a thread of this node, and with it the node."""
-        self.ended = threading.Event()
-        """Set when the node shall end by itself."""
+        self._endings: SimpleQueue[None] = SimpleQueue()
+        """A queue, because a signal handler may put into it wherever it interrupts."""
         self._said: dict[str, float] = {}
         self._said_lock = threading.Lock()
 
@@ -82,7 +86,15 @@ class PeaceNode(Node):  # type: ignore[misc]
     def fail(self, error: Exception) -> None:
         """Remember a defect of ours and end the process in an orderly way; see :func:`run`."""
         self.failure = self.failure or error
-        self.ended.set()
+        self.end()
+
+    def end(self) -> None:
+        """Let :meth:`wait_until_ended` return; from any thread or signal handler."""
+        self._endings.put(None)
+
+    def wait_until_ended(self) -> None:
+        """Block until the node shall end."""
+        self._endings.get()
 
     def close(self) -> None:
         """Stop threads and links; the node itself is destroyed by :func:`run`."""
@@ -115,9 +127,12 @@ def run(
             signal_handler_options=SignalHandlerOptions.NO,
         )
         node = create()
+        _end_on_signals(node)
         _spin_until_ended(node, threads)
     except _Interrupted:
-        return EXIT_OK
+        # Half a node can be neither used nor destroyed, and the threads of its middleware would
+        # abort an ordinary exit.
+        os._exit(EXIT_OK)
     except PeaceError as error:
         return _refused(error)
     except RuntimeError as error:
@@ -136,29 +151,47 @@ def run(
     return EXIT_OK
 
 
+def _end_on_signals(node: PeaceNode) -> None:
+    """End by the front door from now on: an exception could strike in the middle of anything."""
+
+    def end(_number: int, _frame: FrameType | None) -> None:
+        node.end()
+
+    for number in _SIGNALS:
+        signal.signal(number, end)
+
+
+class _PatientExecutor(MultiThreadedExecutor):  # type: ignore[misc]
+    """Waits for the callbacks under way, which rclpy's own leaves running on a destroyed node."""
+
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        self._executor.shutdown(wait=True)
+        return bool(super().shutdown(timeout_sec))
+
+
 def _spin_until_ended(node: PeaceNode, threads: int) -> None:
     """Spin in a thread, because Python runs signal handlers only while its main thread is free."""
-    executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
+    executor = SingleThreadedExecutor() if threads == 1 else _PatientExecutor(threads)
     executor.add_node(node)
+    enough = Future()
 
     def spin() -> None:
         try:
-            executor.spin()
-        except ExternalShutdownException:
-            node.ended.set()
+            with suppress(ExternalShutdownException):
+                executor.spin_until_future_complete(enough)
         except Exception as error:
             node.fail(error)
+        node.end()
 
     spinner = threading.Thread(target=spin, name='spin', daemon=True)
     spinner.start()
-    try:
-        node.ended.wait()
-    finally:
-        for number in _SIGNALS:
-            signal.signal(number, signal.SIG_IGN)
-        executor.shutdown(timeout_sec=_SHUTDOWN_S)
-        spinner.join(timeout=_SHUTDOWN_S)
-        node.close()
+    node.wait_until_ended()
+    # First no new callbacks, then links closed, so that those under way soon end, and only then
+    # may anything be destroyed.
+    enough.set_result(None)
+    spinner.join(timeout=_SHUTDOWN_S)
+    node.close()
+    executor.shutdown(timeout_sec=_SHUTDOWN_S)
 
 
 def _refused(error: Exception) -> int:

@@ -11,12 +11,12 @@ from __future__ import annotations
 from math import atan, isfinite
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Frame, ImageError, Pose, RecordingError
+from peace_ros.domain import Frame, Pose, RecordingError
 from peace_ros.domain.geometry import attitude_enu_flu_to_ned_frd, enu_to_ned
+from peace_ros.images import jpeg_from_rgb, rgb_from_message
 from peace_ros.recording.bag import TYPESTORE
 
 if TYPE_CHECKING:
@@ -29,18 +29,6 @@ POSE_TYPES = (
     'nav_msgs/msg/Odometry',
 )
 
-MAX_IMAGE_PX = 64_000_000
-"""Larger images are refused: no nadir camera has them, a damaged header may claim them."""
-
-_CHANNELS = {'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4, 'mono8': 1, '8UC3': 3, '8UC1': 1}
-_TO_RGB = {
-    'bgr8': cv2.COLOR_BGR2RGB,
-    '8UC3': cv2.COLOR_BGR2RGB,
-    'rgba8': cv2.COLOR_RGBA2RGB,
-    'bgra8': cv2.COLOR_BGRA2RGB,
-    'mono8': cv2.COLOR_GRAY2RGB,
-    '8UC1': cv2.COLOR_GRAY2RGB,
-}
 _NS = 1_000_000_000
 _TYPES = TYPESTORE.types
 
@@ -58,58 +46,7 @@ def frame_from_message(message: Any) -> Frame:
         ImageError: unknown encoding, impossible size, or bytes that are no whole image.
 
     """
-    if hasattr(message, 'format'):
-        return Frame(_decompress(message), stamp_ns_of(message))
-    return Frame(_unpack(message), stamp_ns_of(message))
-
-
-def _unpack(message: Any) -> NDArray[np.uint8]:
-    encoding, height, width = str(message.encoding), int(message.height), int(message.width)
-    channels = _CHANNELS.get(encoding)
-    if channels is None:
-        raise ImageError(f'image encoding {encoding!r}: publish one of {", ".join(_CHANNELS)}')
-    _check_size(width, height)
-    row = width * channels
-    step = int(message.step) or row
-    data = np.frombuffer(memoryview(message.data), np.uint8)
-    if step < row or data.size < step * (height - 1) + row:
-        raise ImageError(
-            f'image {width} x {height} {encoding} with step {step} has {data.size} bytes: '
-            f'it needs {row * height}'
-        )
-    rows = np.lib.stride_tricks.as_strided(data, (height, row), (step, 1))
-    image = np.ascontiguousarray(rows).reshape(height, width, channels)
-    if encoding in _TO_RGB:
-        return np.asarray(cv2.cvtColor(image, _TO_RGB[encoding]), np.uint8)
-    return image
-
-
-def _decompress(message: Any) -> NDArray[np.uint8]:
-    data = np.frombuffer(memoryview(message.data), np.uint8)
-    kind = str(message.format)
-    if data.size == 0:
-        raise ImageError(f'compressed image ({kind!r}) has 0 bytes: publish whole JPEG or PNG')
-    if data[:2].tobytes() == b'\xff\xd8' and b'\xff\xd9' not in data[-64:].tobytes():
-        raise ImageError(
-            f'compressed image ({kind!r}) of {data.size} bytes is a JPEG without its end: it was '
-            'cut short on the way'
-        )
-    try:
-        image = cv2.imdecode(data, cv2.IMREAD_COLOR)
-    except cv2.error as error:
-        raise ImageError(f'compressed image ({kind!r}) cannot be decoded: {error}') from error
-    if image is None:
-        raise ImageError(
-            f'compressed image ({kind!r}) of {data.size} bytes cannot be decoded: publish JPEG '
-            'or PNG'
-        )
-    _check_size(image.shape[1], image.shape[0])
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8)
-
-
-def _check_size(width: int, height: int) -> None:
-    if width < 1 or height < 1 or width * height > MAX_IMAGE_PX:
-        raise ImageError(f'image of {width} x {height} px: it must hold 1 to {MAX_IMAGE_PX} pixels')
+    return Frame(rgb_from_message(message), stamp_ns_of(message))
 
 
 def pose_from_message(message: Any) -> Pose:
@@ -184,18 +121,8 @@ def jpeg_image(
     return _TYPES['sensor_msgs/msg/CompressedImage'](
         header=header(stamp_ns, frame_id),
         format='rgb8; jpeg compressed bgr8',
-        data=encode_jpeg(image_rgb, quality),
+        data=np.frombuffer(jpeg_from_rgb(image_rgb, quality), np.uint8),
     )
-
-
-def encode_jpeg(image_rgb: NDArray[np.uint8], quality: int = 90) -> NDArray[np.uint8]:
-    """Return the bytes of a JPEG of a height x width x 3 uint8 RGB array."""
-    done, data = cv2.imencode(
-        '.jpg', cv2.cvtColor(image_rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality]
-    )
-    if not done:
-        raise ImageError(f'image of shape {image_rgb.shape} cannot be encoded as JPEG')
-    return np.asarray(data, np.uint8).reshape(-1)
 
 
 def diagnostic_array(

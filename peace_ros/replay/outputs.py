@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from peace_ros.landing.pairs import decision_pairs
+from peace_ros.prompting.pairs import prompt_pairs
 from peace_ros.recording import BagWriter, VideoWriter, canvas, save_picture
 from peace_ros.recording.contact_sheet import Cell, draw_contact_sheet
 from peace_ros.recording.messages import diagnostic_array, jpeg_image, mono8_image
-from peace_ros.replay.status import prompt_values, status_values
 from peace_ros.segmentation import draw_overlay
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ class ReplayOutputs:
     def add_look(self, look: Look, step: Step | None) -> None:
         """Write prompt, heatmap and overlay of a frame; ``step`` is the newest decision."""
         stamp_ns = look.frame.stamp_ns
-        values = prompt_values(look.prompt)
+        values = prompt_pairs(look.prompt)
         message = diagnostic_array(stamp_ns, 'prompt', _OK, look.prompt.template, values)
         self._bag.write('/prompt', stamp_ns, message)
         levels = np.rint(look.heatmap.safety * 255.0).astype(np.uint8)
@@ -93,7 +94,7 @@ class ReplayOutputs:
         decision = step.decision
         level = _WARN if decision.state.value in _QUIET_STATES else _OK
         message = diagnostic_array(
-            step.stamp_ns, 'landing', level, decision.reason, status_values(decision, step.pose)
+            step.stamp_ns, 'landing', level, decision.reason, decision_pairs(decision, step.pose)
         )
         self._bag.write('/landing/status', step.stamp_ns, message)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from peace_ros.domain import Camera, RecordingError
+from peace_ros.recording.run_folder import create_run_folder
 from peace_ros.replay.line import Look, ReplayLine, Step
 from peace_ros.replay.outputs import ReplayOutputs
 from peace_ros.replay.preset import DEFAULT_PRESET, load_preset
@@ -34,27 +35,17 @@ class ReplayOptions:
     source: Path
     config: str = DEFAULT_PRESET
     out: Path | None = None
-    """Output folder; None: ``<name of the source>_replay`` where the user stands."""
+    """Folder of the results; None: ``runs/<name of the source>_replay`` where the user stands."""
     part: SourceOptions = field(default_factory=SourceOptions)
 
     def new_folder(self) -> Path:
         """Return the output folder, created.
 
         Raises:
-            RecordingError: it holds something already or cannot be created.
+            ConfigurationError: it holds something already or cannot be created.
 
         """
-        folder = self.out or Path(f'{self.source.resolve().stem}_replay')
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            occupied = any(folder.iterdir())
-        except OSError as error:
-            raise RecordingError(
-                f'output folder {folder} cannot be used ({error}): give --out DIR'
-            ) from error
-        if occupied:
-            raise RecordingError(f'output folder {folder} is not empty: give another --out')
-        return folder.resolve()
+        return create_run_folder(self.out, f'{self.source.resolve().stem}_replay', '--out')
 
 
 def replay(options: ReplayOptions, progress: Progress | None = None) -> tuple[ReplayReport, Path]:

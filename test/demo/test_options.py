@@ -93,14 +93,13 @@ def test_a_vehicle_that_may_be_real_is_never_armed(url) -> None:
         refuse_to_arm_elsewhere(url)
 
 
-def test_a_run_folder_with_something_in_it_is_refused(tmp_path) -> None:
-    fresh = DemoOptions(run_dir=tmp_path / 'a' / 'b').new_run_dir()
-    assert fresh.is_dir()
-    (fresh / 'summary.json').write_text('{}')
-    with pytest.raises(ConfigurationError, match='not empty'):
-        DemoOptions(run_dir=fresh).new_run_dir()
+def test_results_go_where_the_user_stands(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    fresh = DemoOptions(seed=7).new_run_dir()
+    assert fresh.parent == tmp_path / 'runs'
+    assert fresh.name.endswith('-seed7')
     with pytest.raises(ConfigurationError, match='--run-dir'):
-        DemoOptions(run_dir=fresh / 'summary.json').new_run_dir()
+        DemoOptions(run_dir=fresh.parent).new_run_dir()
 
 
 def test_a_label_raster_beside_the_world_is_found_and_said(photo, tmp_path) -> None:

@@ -76,6 +76,7 @@ def test_leaving_the_group_stops_every_process(tmp_path, modules) -> None:
         group.check()
         assert all(alive(pid) for pid in pids.values())
     assert not any(alive(pid) for pid in pids.values())
+    assert 'Traceback' not in (tmp_path / 'logs' / 'one.log').read_text()
 
 
 def test_a_process_that_ignores_polite_signals_is_killed(tmp_path, modules, monkeypatch) -> None:

@@ -53,6 +53,14 @@ def test_stands_idle_until_engaged(core):
     assert decision.outcome is None
 
 
+def test_the_first_state_begins_with_the_first_step_also_on_the_clock_of_the_day(core):
+    begin_ns = 1_795_000_000 * S
+    assert core.step(begin_ns, None, inf).time_in_state_s == 0.0
+    later = core.step(begin_ns + S // 2, None, inf)
+    assert later.state is State.IDLE
+    assert later.time_in_state_s == pytest.approx(0.5)
+
+
 def test_holds_and_says_why_before_anything_was_seen(core):
     core.engage()
     core.step(S, None, inf)

@@ -20,6 +20,7 @@ from rclpy.parameter import Parameter
 
 from peace_ros.nodes.messages import image_message
 from peace_ros.nodes.runtime import PeaceNode
+from peace_ros.vehicle import Pilot, VehicleParameters, open_vehicle
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ['ROS_DOMAIN_ID'] = str(1 + os.getpid() % 100)
@@ -119,3 +120,17 @@ def picture() -> Callable[[int], Any]:
 @pytest.fixture
 def values_of() -> Callable[[DiagnosticArray], dict[str, str]]:
     return lambda message: {each.key: each.value for each in message.status[0].values}
+
+
+@pytest.fixture
+def take_off() -> Callable[[str, float], None]:
+    """Bring the vehicle of a URL into the air, and leave the line."""
+
+    def climb(url: str, altitude_m: float) -> None:
+        link = open_vehicle(url, parameters=VehicleParameters(system_id=250))
+        try:
+            Pilot(link).take_off(altitude_m, timeout_s=20.0, arm=True)
+        finally:
+            link.close()
+
+    return climb

@@ -16,20 +16,11 @@ from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
 from peace_ros.nodes.messages import heatmap_to_image
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim, Mode
-from peace_ros.vehicle import Pilot, VehicleParameters, open_vehicle
 
 CLIMB_M = 30.0
 
 
-def take_off(url: str) -> None:
-    link = open_vehicle(url, parameters=VehicleParameters(system_id=250))
-    try:
-        Pilot(link).take_off(CLIMB_M, timeout_s=20.0, arm=True)
-    finally:
-        link.close()
-
-
-def test_a_landing_from_refusal_to_takeover(bench, values_of):
+def test_a_landing_from_refusal_to_takeover(bench, values_of, take_off):
     statuses = bench.heard(DiagnosticArray, 'landing/status', qos.RESULT)
     with AutopilotSim(AutopilotParameters(port=0, speed=25.0)) as sim:
         node = bench.run(LandingNode, mavlink=sim.url, safe_altitude_m=20.5)
@@ -51,7 +42,7 @@ def test_a_landing_from_refusal_to_takeover(bench, values_of):
         bench.until(client.service_is_ready)
         bench.until(lambda: now().get('north_m') is not None, see)
         assert 'not armed' in engage().message
-        flying = threading.Thread(target=take_off, args=(sim.url,))
+        flying = threading.Thread(target=take_off, args=(sim.url, CLIMB_M))
         flying.start()
         bench.until(lambda: not flying.is_alive(), see)
         assert abs(sim.truth().altitude_agl_m - CLIMB_M) < 2.0

@@ -26,6 +26,47 @@ def start(node: str, *arguments: str) -> subprocess.Popen[str]:
     )
 
 
+SLOW_NODE = """
+import sys, time
+from std_msgs.msg import String
+from peace_ros.nodes.runtime import PeaceNode, run
+
+class SlowNode(PeaceNode):
+    def __init__(self):
+        super().__init__('slow')
+        self.out = self.create_publisher(String, 'said', 1)
+        self.timer = self.create_timer(0.01, self.speak)
+
+    def speak(self):
+        print('begun', flush=True)
+        time.sleep(0.5)
+        self.out.publish(String(data='late'))
+        print('published', flush=True)
+
+    def close(self):
+        print('closed', flush=True)
+
+sys.exit(run(SlowNode, threads=int(sys.argv[1])))
+"""
+
+
+@pytest.mark.parametrize('threads', [1, 2])
+def test_nothing_is_destroyed_under_a_callback(threads):
+    with subprocess.Popen(
+        [sys.executable, '-c', SLOW_NODE, str(threads)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == 'begun\n'
+        process.send_signal(signal.SIGINT)
+        rest = process.stdout.read()
+        assert process.wait(20) == 0
+    assert sorted(rest.splitlines()) == ['closed', 'published']
+
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_ends_quietly_on_a_signal(number):
     with start('prompt_generator', '-p', 'template:=DD') as process:

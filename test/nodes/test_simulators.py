@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from math import pi
+from math import pi, radians
 
 import cv2
 import numpy as np
@@ -15,6 +15,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 
 from peace_ros.domain import ConfigurationError, Pose, VehicleError, WorldError
+from peace_ros.domain.geometry import yaw_from_quaternion
 from peace_ros.nodes import qos
 from peace_ros.nodes.autopilot_sim import AutopilotSimNode
 from peace_ros.nodes.messages import (
@@ -26,6 +27,7 @@ from peace_ros.nodes.messages import (
 )
 from peace_ros.nodes.satellite_view import SatelliteViewNode
 from peace_ros.nodes.twist_vehicle import TwistVehicle
+from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 
@@ -100,6 +102,25 @@ def test_flies_by_twist_and_publishes_the_pose(bench, world):
     assert pose_from_message(poses[-1]).north_m > 0.5
     assert pose_from_message(poses[-1]).east_m == pytest.approx(0.0)
     bench.until(lambda: bool(images))
+
+
+def test_follows_an_autopilot_and_publishes_its_pose(bench, world, take_off):
+    images = bench.heard(Image, 'image', qos.IMAGE_IN)
+    poses = bench.heard(PoseStamped, 'pose', qos.POSE)
+    start = {'start_north_m': 12.0, 'start_east_m': -7.0, 'start_heading_deg': 40.0}
+    with AutopilotSim(AutopilotParameters(port=0, speed=25.0, **start)) as sim:
+        node = bench.run(SatelliteViewNode, world=world, gsd=0.5, pose_mavlink=sim.url)
+        take_off(sim.url, 30.0)
+        bench.until(lambda: bool(poses) and pose_from_message(poses[-1]).altitude_agl_m > 28.0)
+        truth, pose = sim.truth(), pose_from_message(poses[-1])
+    assert (pose.north_m, pose.east_m) == pytest.approx((truth.north_m, truth.east_m), abs=0.5)
+    same = np.dot(pose.quaternion_ned_frd, truth.quaternion_ned_frd)
+    assert abs(same) > 0.999
+    assert yaw_from_quaternion(pose.quaternion_ned_frd) == pytest.approx(radians(40.0), abs=0.05)
+    stamps = [stamp_ns(each) for each in poses]
+    assert all(later > earlier for earlier, later in pairwise(stamps))
+    assert abs(node.clock_ns() - stamps[-1]) < 5e9
+    assert {stamp_ns(each) for each in images} & set(stamps)
 
 
 def test_a_world_that_is_missing_is_refused(bench):

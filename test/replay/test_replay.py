@@ -104,10 +104,12 @@ def test_nothing_is_written_half_when_no_frame_can_be_used(tmp_path) -> None:
     assert list((tmp_path / 'out').iterdir()) == []
 
 
-def test_a_folder_with_results_is_not_overwritten(tmp_path) -> None:
-    (tmp_path / 'summary.json').write_text('{}')
-    with pytest.raises(RecordingError, match='not empty'):
-        replay(ReplayOptions(SMALL, out=tmp_path))
+def test_results_go_where_the_user_stands_and_not_beside_the_recording(
+    tmp_path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folders = [ReplayOptions(SMALL).new_folder() for _ in range(2)]
+    assert folders == [tmp_path / 'runs' / 'small_replay', tmp_path / 'runs' / 'small_replay_2']
 
 
 def reference(**changes) -> Reference:

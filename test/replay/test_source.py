@@ -80,7 +80,7 @@ def test_a_frame_that_is_cut_short_is_told_and_the_others_are_used(tmp_path) -> 
     source = open_source(write_bag(tmp_path / 'a.mcap', broken=(2, 5)), SourceOptions())
     taken = list(source.frames())
     assert [each.frame is None for each in taken] == [False, True, False, False, True, False]
-    assert 'cut short' in taken[1].fault
+    assert 'truncated' in taken[1].fault
 
 
 def test_the_recorded_engagement_is_found(tmp_path) -> None:

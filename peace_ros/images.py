@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pixels of image messages <-> RGB arrays; whatever cannot be trusted is an ImageError.
 
-Nothing here imports ROS: readers take the fields of sensor_msgs/Image and CompressedImage.
+Nodes and recordings read by the same rules; nothing here imports ROS or a type store.
 """
 
 from __future__ import annotations
@@ -19,12 +19,14 @@ from peace_ros.domain import ImageError
 MAX_PIXELS = 50_000_000
 """Larger images are refused before they are decoded: a damaged header may claim anything."""
 
-_CHANNELS = {'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4, 'mono8': 1}
+_CHANNELS = {'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4, 'mono8': 1, '8UC3': 3, '8UC1': 1}
 _TO_RGB = {
     'bgr8': cv2.COLOR_BGR2RGB,
     'rgba8': cv2.COLOR_RGBA2RGB,
     'bgra8': cv2.COLOR_BGRA2RGB,
     'mono8': cv2.COLOR_GRAY2RGB,
+    '8UC3': cv2.COLOR_BGR2RGB,  # as OpenCV keeps colours, and cv_bridge with it
+    '8UC1': cv2.COLOR_GRAY2RGB,
 }
 _JPEG_START = b'\xff\xd8'
 _JPEG_END = b'\xff\xd9'
@@ -35,13 +37,25 @@ _START_OF_SCAN = 0xDA
 _WITHOUT_LENGTH = frozenset(range(0xD0, 0xD8)) | {0x01}
 
 
+def rgb_from_message(message: Any) -> NDArray[np.uint8]:
+    """Return the height x width x 3 RGB array of any object with the fields of an image message.
+
+    Raises:
+        ImageError: see :func:`rgb_from_raw` and :func:`rgb_from_compressed`.
+
+    """
+    if hasattr(message, 'format'):
+        return rgb_from_compressed(message.format, message.data)
+    return rgb_from_raw(message.encoding, message.width, message.height, message.step, message.data)
+
+
 def pixels_from_raw(
     encoding: str, width: int, height: int, step: int, data: Any
 ) -> NDArray[np.uint8]:
     """Return the height x width x channels array of a raw image, without a copy where possible.
 
     Args:
-        encoding: One of rgb8, bgr8, rgba8, bgra8, mono8.
+        encoding: One of rgb8, bgr8, rgba8, bgra8, mono8, 8UC3 (BGR), 8UC1.
         width: Pixels of a row.
         height: Rows.
         step: Bytes from one row to the next; what exceeds the pixels is padding.
@@ -54,7 +68,7 @@ def pixels_from_raw(
     channels = _CHANNELS.get(encoding)
     if channels is None:
         raise ImageError(f'image encoding {encoding!r}: publish one of {", ".join(_CHANNELS)}')
-    check_size(width, height)
+    _check_size(width, height)
     row_bytes = width * channels
     if step < row_bytes:
         raise ImageError(
@@ -102,7 +116,7 @@ def rgb_from_compressed(kind: str, data: Any) -> NDArray[np.uint8]:
             f'compressed image of {len(encoded)} bytes with format {kind!r} is neither JPEG nor '
             'PNG: publish one of them'
         )
-    check_size(width, height)
+    _check_size(width, height)
     try:
         bgr = cv2.imdecode(
             np.frombuffer(encoded, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
@@ -124,7 +138,7 @@ def jpeg_from_rgb(image_rgb: NDArray[np.uint8], quality: int) -> bytes:
     return bytes(encoded.tobytes())
 
 
-def check_size(width: int, height: int) -> None:
+def _check_size(width: int, height: int) -> None:
     """Raise ImageError unless the image has 1 to MAX_PIXELS pixels."""
     if width < 1 or height < 1:
         raise ImageError(f'image of {width} x {height} px is empty: both must be 1 or more')

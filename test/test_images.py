@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from peace_ros.domain import ImageError
-from peace_ros.nodes.images import (
+from peace_ros.images import (
     MAX_PIXELS,
     jpeg_from_rgb,
     pixels_from_raw,
@@ -21,11 +21,11 @@ from peace_ros.nodes.images import (
     rgb_from_raw,
 )
 
-CHANNELS = {'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4, 'mono8': 1}
+CHANNELS = {'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4, 'mono8': 1, '8UC3': 3, '8UC1': 1}
 
 
 def rgb_of(encoding: str, pixels: np.ndarray) -> np.ndarray:
-    order = {'rgb8': [0, 1, 2], 'rgba8': [0, 1, 2], 'mono8': [0, 0, 0]}
+    order = {'rgb8': [0, 1, 2], 'rgba8': [0, 1, 2], 'mono8': [0, 0, 0], '8UC1': [0, 0, 0]}
     return pixels[..., order.get(encoding, [2, 1, 0])]
 
 

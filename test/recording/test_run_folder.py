@@ -1,0 +1,39 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Results never land on those of another run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from peace_ros.domain import ConfigurationError
+from peace_ros.recording.run_folder import create_run_folder
+
+
+def test_a_chosen_folder_may_be_new_or_empty(tmp_path) -> None:
+    for _ in range(2):
+        assert create_run_folder(tmp_path / 'a' / 'b', 'name', '--out') == tmp_path / 'a' / 'b'
+    assert (tmp_path / 'a' / 'b').is_dir()
+
+
+def test_a_chosen_folder_with_results_is_refused(tmp_path) -> None:
+    (tmp_path / 'summary.json').write_text('{}')
+    with pytest.raises(ConfigurationError, match=r'not empty: give another --out'):
+        create_run_folder(tmp_path, 'name', '--out')
+    with pytest.raises(ConfigurationError, match=r'cannot be used .* give --out DIR'):
+        create_run_folder(tmp_path / 'summary.json', 'name', '--out')
+
+
+def test_without_a_choice_every_run_gets_a_folder_of_its_own(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    names = [create_run_folder(None, 'v1.2', '--out').name for _ in range(3)]
+    assert names == ['v1.2', 'v1.2_2', 'v1.2_3']
+
+
+def test_a_place_without_room_for_runs_is_refused(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('runs').write_text('no folder')
+    with pytest.raises(ConfigurationError, match=r'runs/name cannot be used'):
+        create_run_folder(None, 'name', '--out')
