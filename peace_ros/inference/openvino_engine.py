@@ -57,9 +57,7 @@ class OpenVinoEngine:
             tuple(_signature(each) for each in self._model.outputs),
         )
 
-    def run(
-        self, outputs: Sequence[str], feeds: Mapping[str, NDArray[Any]]
-    ) -> list[NDArray[Any]]:
+    def run(self, outputs: Sequence[str], feeds: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:
         """Return the named outputs in their order; raises RuntimeError."""
         with self._lock:
             request = self._request(tuple(outputs), feeds)

@@ -71,9 +71,7 @@ def with_options(providers: Sequence[str], checksum: str) -> list[Any]:
         providers: names, the preferred one first.
         checksum: of the ONNX file; an engine that TensorRT built for another file is never used.
     """
-    return [
-        (name, _tensorrt_options(checksum)) if name == TENSORRT else name for name in providers
-    ]
+    return [(name, _tensorrt_options(checksum)) if name == TENSORRT else name for name in providers]
 
 
 def _tensorrt_options(checksum: str) -> dict[str, str]:

@@ -67,7 +67,8 @@ def resize(
     """
     rows = _across(image, width, interpolation)
     scaled: NDArray[np.uint8] = _across(rows.transpose(1, 0, 2), height, interpolation)
-    return scaled.transpose(1, 0, 2)
+    upright: NDArray[np.uint8] = scaled.transpose(1, 0, 2)
+    return upright
 
 
 def _across(image: NDArray[np.uint8], width: int, interpolation: str) -> NDArray[np.uint8]:
@@ -84,7 +85,8 @@ def _across(image: NDArray[np.uint8], width: int, interpolation: str) -> NDArray
         sums += product
     sums >>= _DIGITS
     result: NDArray[np.uint8] = np.clip(sums, 0, 255, out=sums).astype(np.uint8)
-    return result.reshape(width, length, channels).transpose(1, 0, 2)
+    turned: NDArray[np.uint8] = result.reshape(width, length, channels).transpose(1, 0, 2)
+    return turned
 
 
 @lru_cache(maxsize=32)
