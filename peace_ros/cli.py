@@ -49,6 +49,21 @@ def _in_one_sentence(verb: _Verb) -> _Verb:
     return run  # type: ignore[return-value]
 
 
+_HANDED_ON = {
+    'allow_extra_args': True,
+    'ignore_unknown_options': True,
+    'help_option_names': [],
+}
+"""Settings of a verb whose options are declared beside code that is slow to import."""
+
+
+def _hand_on(verb: Callable[..., Any], context: typer.Context) -> None:
+    """Let a verb read its own options from what is left of the command line."""
+    own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    own.command()(verb)
+    own(args=context.args, prog_name=context.command_path, standalone_mode=False)
+
+
 def _status_of(error: PeaceError) -> int:
     from peace_ros.domain import BundleError, RecordingError, WorldError
 
@@ -200,6 +215,33 @@ def replay(
         limit=limit,
     )
     replay_in_terminal(ReplayOptions(source, config, out, part), Console())
+
+
+@app.command(context_settings=_HANDED_ON)
+@_in_one_sentence
+def benchmark(context: typer.Context) -> None:
+    """Time CLIPSeg frame by frame, beside the ways that others run it."""
+    from peace_ros.evaluation.benchmark import command
+
+    _hand_on(command.benchmark, context)
+
+
+@models_app.command(context_settings=_HANDED_ON)
+@_in_one_sentence
+def export(context: typer.Context) -> None:
+    """Export CLIP or CLIPSeg, verify it against the reference, and put the bundle in place."""
+    from peace_ros.inference.export import commands
+
+    _hand_on(commands.export, context)
+
+
+@models_app.command(context_settings=_HANDED_ON)
+@_in_one_sentence
+def fetch(context: typer.Context) -> None:
+    """Fetch a named bundle, checked and resumable."""
+    from peace_ros.inference.export import commands
+
+    _hand_on(commands.fetch, context)
 
 
 @models_app.command('list')

@@ -33,10 +33,13 @@ def test_version_and_help() -> None:
         ('demo', '--mavlink --pose-mavlink'),
         ('replay', '--image-topic --pose-topic --config --out --fov --altitude --every --hz'),
         ('replay', '--limit'),
+        ('benchmark', '--reference --quick --json --provider --threads'),
+        ('models export', '--name --out --precision --images --licence'),
+        ('models fetch', '--index --out'),
     ],
 )
 def test_the_verbs_have_their_options(verb, options) -> None:
-    told = CliRunner().invoke(app, [verb, '--help'], env={'COLUMNS': '200'}).output
+    told = CliRunner().invoke(app, [*verb.split(), '--help'], env={'COLUMNS': '200'}).output
     for option in options.split():
         assert option in told
 
@@ -79,3 +82,11 @@ def test_the_bundled_models_are_listed_shown_and_whole() -> None:
         assert name in listed
         assert 'files are whole' in peace('models', 'verify', name).output
         assert '"provenance"' in peace('models', 'info', name).output
+
+
+def test_a_verb_that_is_handed_on_refuses_in_one_sentence(monkeypatch) -> None:
+    monkeypatch.delenv('PEACE_MODELS_INDEX', raising=False)
+    result = peace('models', 'fetch', 'clipseg')
+    assert result.exit_code == 2
+    assert 'give --index' in result.stderr
+    assert peace('benchmark', '--no-such-option').exit_code == 2

@@ -1,0 +1,116 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``peace benchmark``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from peace_ros.domain import ConfigurationError
+from peace_ros.evaluation.benchmark.bundles import random_bundles
+from peace_ros.evaluation.benchmark.measure import Measured
+from peace_ros.evaluation.benchmark.report import clipseg_figures, describe_machine, markdown
+from peace_ros.evaluation.benchmark.scene import TERMS_13
+from peace_ros.evaluation.benchmark.worker import measure_apart
+from peace_ros.inference.providers import CPU, available_providers, check_providers
+
+_CACHE = '~/.cache/peace_ros/benchmark'
+_CLIPSEG = 'peace_ros.evaluation.benchmark.clipseg'
+_REFERENCE = 'peace_ros.evaluation.benchmark.reference:measure_reference'
+_RANDOM = 'random'
+
+
+def benchmark(
+    *,
+    reference: Annotated[
+        bool,
+        typer.Option('--reference', help='Also time the reference path (export extra).'),
+    ] = False,
+    quick: Annotated[
+        bool, typer.Option('--quick', help='Fewer frames; within 4 minutes on two cores.')
+    ] = False,
+    json_file: Annotated[
+        Path | None, typer.Option('--json', metavar='FILE', help='Write the figures here.')
+    ] = None,
+    table: Annotated[
+        Path, typer.Option(metavar='FILE', help='Write the Markdown table here.')
+    ] = Path('benchmark.md'),
+    clipseg: Annotated[
+        str, typer.Option(metavar='BUNDLE', help='CLIPSeg to time; none: random, true size.')
+    ] = '',
+    clip: Annotated[
+        str, typer.Option(metavar='BUNDLE', help='CLIP that ranks words; none: random ViT-B/32.')
+    ] = '',
+    source: Annotated[
+        str, typer.Option(help='What --clipseg was exported from, for the reference.')
+    ] = _RANDOM,
+    clip_source: Annotated[
+        str, typer.Option(help='The CLIP that ranks in the reference; none: random ViT-L/14.')
+    ] = _RANDOM,
+    provider: Annotated[
+        str, typer.Option(help='Execution provider; none: the first of OpenVINO and CPU.')
+    ] = '',
+    threads: Annotated[int, typer.Option(min=1, max=64, help='CPU threads.')] = 2,
+    work: Annotated[
+        Path, typer.Option(metavar='DIR', help='Where random bundles are kept.')
+    ] = Path(_CACHE),
+) -> None:
+    """Time CLIPSeg frame by frame, beside the ways that others run it."""
+    provider = provider or _fastest()
+    check_providers((provider,))
+    if reference and bool(clipseg) != (source != _RANDOM):
+        raise ConfigurationError(
+            f'--clipseg {clipseg or "(random)"} with --source {source}: the reference must have '
+            'the same weights; give both or neither'
+        )
+    random = random_bundles(work, typer.echo) if not (clipseg and clip) else {}
+    clipseg = clipseg or str(random['clipseg-rd64-int8'])
+    fp32 = str(random['clipseg-rd64-fp32']) if 'int8' in clipseg and random else clipseg
+    clip = clip or str(random['clip-vit-b-32-int8'])
+    conditions = describe_machine(threads, len(TERMS_13))
+    frames = 30 if quick else 60
+    setup = {'clipseg': clipseg, 'clip': clip, 'threads': threads}
+    typer.echo(f'{conditions}\ntiming peace_ros on {provider} ...')
+    ours = _measure('ours', **setup, provider=provider, frames=frames)
+    plain = {**setup, 'clipseg': fp32, 'provider': CPU}
+    typer.echo('measuring the memory of fp32 ...')
+    memory = _measure('memory', **plain, frames=3)
+    typer.echo("timing BlabberSeg's way ...")
+    blabberseg = _measure('blabberseg', **plain, frames=5 if quick else 15)
+    slow = None
+    if reference:
+        typer.echo('timing the reference path ...')
+        slow = measure_apart(
+            _REFERENCE,
+            source=source,
+            clip_source=clip_source,
+            tokenizer_bundle=clipseg,
+            threads=threads,
+            count=2 if quick else 5,
+        )
+    figures = clipseg_figures(ours, memory, slow, blabberseg)
+    ways = [way for way in (ours, blabberseg, slow) if way is not None]
+    text = markdown(ways, figures, conditions)
+    typer.echo(text)
+    table.write_text(text, encoding='utf-8')
+    if json_file is not None:
+        _write_json(json_file, {'clipseg': figures, 'conditions': conditions})
+
+
+def _fastest() -> str:
+    available = available_providers()
+    return next(each for each in ('OpenVINOExecutionProvider', CPU) if each in available)
+
+
+def _measure(name: str, **arguments: Any) -> Measured:
+    return measure_apart(f'{_CLIPSEG}:measure_{name}', **arguments)
+
+
+def _write_json(file: Path, figures: dict[str, Any]) -> None:
+    # FastSAM's figures are written by its own measurement and kept here.
+    kept = json.loads(file.read_text(encoding='utf-8')) if file.is_file() else {}
+    file.write_text(json.dumps({**kept, **figures}, indent=2) + '\n', encoding='utf-8')

@@ -1,0 +1,90 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``peace models export`` and ``peace models fetch``."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TimeRemainingColumn
+
+from peace_ros.domain import ConfigurationError
+from peace_ros.inference.bundle import user_models_dir
+
+_INDEX = 'PEACE_MODELS_INDEX'
+_NEEDED = ('torch', 'transformers', 'onnx')
+
+
+def export(
+    source: Annotated[
+        str,
+        typer.Argument(
+            help='Hugging Face id (CIDAS/clipseg-rd64-refined, openai/clip-vit-base-patch32), '
+            'local folder, or OpenAI/OpenCLIP checkpoint.'
+        ),
+    ],
+    *,
+    name: Annotated[str, typer.Option(help='Name of the bundle; none: made of the source.')] = '',
+    out: Annotated[
+        Path | None, typer.Option(metavar='DIR', help="Folder of bundles; none: the user's own.")
+    ] = None,
+    precision: Annotated[str, typer.Option(help='fp32, fp16 (GPU) or int8 (CPU).')] = 'fp32',
+    images: Annotated[
+        Path | None,
+        typer.Option(metavar='DIR', help='Nadir photos to calibrate and verify on.'),
+    ] = None,
+    licence: Annotated[str, typer.Option(help='Licence of the weights.')] = 'that of the source',
+) -> None:
+    """Export CLIP or CLIPSeg, verify it against the reference, and put the bundle in place."""
+    missing = [each for each in _NEEDED if importlib.util.find_spec(each) is None]
+    if missing:
+        raise ConfigurationError(
+            f'export needs {", ".join(missing)}: run pip install "peace_ros[export]"'
+        )
+    from peace_ros.inference.export.build import build_bundle  # noqa: PLC0415 - needs torch
+    from peace_ros.inference.export.pictures import read_pictures  # noqa: PLC0415
+    from peace_ros.inference.export.sources import load_source  # noqa: PLC0415
+
+    frames = read_pictures(images) if images else None
+    loaded = load_source(source)
+    folder = (out or user_models_dir()) / (name or f'{loaded.name}-{precision}')
+    typer.echo(f'exporting {source} ({loaded.family}) in {precision} ...')
+    agreement = build_bundle(loaded, folder, precision=precision, frames=frames, licence=licence)
+    typer.echo(f'{folder}: agrees with its reference: {agreement}')
+    if frames is None:
+        typer.echo("(checked on drawn scenes; give --images DIR with photos like a flight's)")
+
+
+def fetch(
+    name: Annotated[str, typer.Argument(help='Name of the bundle in the index.')],
+    *,
+    index: Annotated[
+        str, typer.Option(envvar=_INDEX, help='URL or file of the index of bundles.')
+    ] = '',
+    out: Annotated[
+        Path | None, typer.Option(metavar='DIR', help="Folder of bundles; none: the user's own.")
+    ] = None,
+) -> None:
+    """Download a bundle by name; an interrupted download goes on where it stopped."""
+    from peace_ros.inference.export.fetch import fetch_bundle  # noqa: PLC0415
+
+    if not index:
+        raise ConfigurationError(
+            f'no index of bundles: give --index or set {_INDEX}; to make a bundle yourself use '
+            'peace models export'
+        )
+    folder = (out or user_models_dir()) / name
+    columns = ('{task.description}', BarColumn(), DownloadColumn(), TimeRemainingColumn())
+    with Progress(*columns) as bar:
+        tasks: dict[str, TaskID] = {}
+
+        def show(file: str, have: int, size: int) -> None:
+            if file not in tasks:
+                tasks[file] = bar.add_task(file, total=size)
+            bar.update(tasks[file], completed=have)
+
+        bundle = fetch_bundle(name, index, folder, show)
+    typer.echo(f'{bundle.folder}: {bundle.manifest.family}, {bundle.manifest.precision}')

@@ -1,0 +1,107 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The benchmark counts and times what the nodes run, and says plainly what was not measured."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from peace_ros.evaluation.benchmark import command
+from peace_ros.evaluation.benchmark.clipseg import measure_blabberseg, measure_ours
+from peace_ros.evaluation.benchmark.measure import Measured, Spread
+from peace_ros.evaluation.benchmark.report import clipseg_figures, markdown
+from peace_ros.evaluation.benchmark.worker import BenchmarkError, measure_apart, run_apart
+
+SMALL: dict[str, Any] = {
+    'clipseg': 'clipseg-small',
+    'clip': 'clip-small',
+    'provider': 'CPUExecutionProvider',
+    'threads': 1,
+    'frames': 12,
+}
+WANTED = {
+    'frame_ms_p50',
+    'frame_ms_p95',
+    'speedup_vs_reference',
+    'speedup_vs_blabberseg',
+    'cost_39_over_13_terms',
+    'dynamic_prompt_share',
+    'peak_rss_mb',
+    'calls_per_frame',
+}
+
+
+@pytest.fixture(scope='module')
+def ours() -> Measured:
+    return measure_ours(**SMALL)
+
+
+def test_a_steady_frame_costs_one_encoding_one_decoding_and_no_text(ours: Measured) -> None:
+    assert ours.extra['steady_calls'] == {'image_encoder': 1, 'text_encoder': 0, 'decoder': 1}
+
+
+def test_ranking_runs_at_its_own_rate(ours: Measured) -> None:
+    # 12 stamps at 5 frames/s: the first frame and the one 2 s later.
+    assert ours.extra['calls_per_frame']['ranking'] == pytest.approx(2 / 12)
+    assert ours.extra['calls_per_frame']['image_encoder'] == 1
+
+
+def test_every_figure_is_there_and_survives_json(ours: Measured) -> None:
+    again = Measured.from_json(json.loads(json.dumps(ours.as_json())))
+    assert again == ours
+    slow = measure_blabberseg(**{**SMALL, 'frames': 2})
+    figures = clipseg_figures(ours, None, None, slow)
+    assert set(figures) >= WANTED
+    assert figures['speedup_vs_reference'] is None
+    assert figures['speedup_vs_blabberseg'] > 0.0
+    text = markdown([ours, slow], figures, 'on a test machine')
+    assert '| speedup_vs_reference | not measured |' in text
+    assert '| peace_ros | fp32, CPUExecutionProvider | frame |' in text
+
+
+def test_each_way_has_a_process_of_its_own() -> None:
+    found = measure_apart(
+        'peace_ros.evaluation.benchmark.clipseg:measure_memory', **{**SMALL, 'frames': 2}
+    )
+    assert found.frames == 2
+    assert found.peak_rss_mb > 20.0
+    with pytest.raises(BenchmarkError, match=r"no model bundle 'nowhere'"):
+        run_apart('peace_ros.evaluation.benchmark.clipseg:measure_memory', **{
+            **SMALL, 'clipseg': 'nowhere',
+        })  # fmt: skip
+
+
+def test_the_command_writes_table_and_json_and_keeps_other_objects(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def measure(name: str, **arguments: Any) -> Measured:
+        spread = Spread(100.0, 110.0, 120.0, 101.0)
+        extra = {
+            'cost_39_over_13_terms': 1.3,
+            'cost_per_term': 0.01,
+            'dynamic_prompt_share': 0.02,
+            'steady_calls': {'decoder': 1.0},
+            'calls_per_frame': {'decoder': 1.0},
+            'ranking_ms': 30.0,
+            'prompts': 2,
+        }
+        return Measured(name, 'fake', {'frame': spread}, 3, 500.0, 90.0, extra)
+
+    monkeypatch.setattr(command, '_measure', measure)
+    file = tmp_path / 'figures.json'
+    file.write_text('{"fastsam": {"frame_ms_p50": 1.0}}')
+    app = typer.Typer()
+    app.command()(command.benchmark)
+    options = ['--clipseg', 'clipseg-small', '--clip', 'clip-small', '--json', str(file)]
+    result = CliRunner().invoke(app, [*options, '--table', str(tmp_path / 'table.md')])
+    assert result.exit_code == 0, result.output
+    figures = json.loads(file.read_text())
+    assert figures['clipseg']['frame_ms_p50'] == 100.0
+    assert figures['fastsam'] == {'frame_ms_p50': 1.0}
+    assert '| frame_ms_p50 | 100 |' in (tmp_path / 'table.md').read_text()

@@ -1,0 +1,174 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is exported equals its reference, or nothing is written."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('transformers')
+pytest.importorskip('torch')
+
+import onnx
+
+from peace_ros.domain import BundleError, Frame, Prompt
+from peace_ros.inference import Bundle, ClipEncoder
+from peace_ros.inference.export import build, sources, verify
+from peace_ros.inference.export.build import build_bundle
+from peace_ros.inference.export.random_models import random_clip, random_clipseg
+from peace_ros.inference.export.sources import from_model, load_source
+from peace_ros.segmentation import ClipSegSegmenter, SegmentationParameters, Terms
+
+pytestmark = pytest.mark.export
+
+TERMS = Terms(('grass', 'park'), ('road', 'car', 'water'))
+PROMPT = Prompt('A rendered image of {term} in spring.', 0)
+
+
+def layers_of(path: Path) -> set[str]:
+    names = [node.name for node in onnx.load(str(path)).graph.node]
+    return {name.split('layers.')[1].split('/')[0] for name in names if 'layers.' in name}
+
+
+@pytest.mark.parametrize('refined', [False, True])
+@pytest.mark.parametrize('reduce_dim', [16, 64])
+def test_every_kind_of_clipseg_decoder_agrees(
+    make_small_clipseg: Callable[..., Any], tmp_path: Path, refined: bool, reduce_dim: int
+) -> None:
+    model = make_small_clipseg(refined=refined, reduce_dim=reduce_dim)
+    agreement = build_bundle(from_model('small', 'clipseg', model), tmp_path / 'small')
+    assert agreement.difference < 1e-4
+    assert agreement.iou > 0.999
+
+
+def test_a_small_clip_agrees_in_every_precision(small_clip: Any, tmp_path: Path) -> None:
+    source = from_model('small', 'clip', small_clip)
+    for precision in ('fp32', 'fp16', 'int8'):
+        agreement = build_bundle(source, tmp_path / precision, precision=precision)
+        assert agreement.cosine > 0.999
+        assert Bundle.load(tmp_path / precision).manifest.precision == precision
+
+
+def test_layer_norm_and_softmax_stay_fp32_in_fp16(small_clip: Any, tmp_path: Path) -> None:
+    build_bundle(from_model('small', 'clip', small_clip), tmp_path / 'half', precision='fp16')
+    model = onnx.load(str(tmp_path / 'half' / 'image_encoder.onnx'))
+    assert model.opset_import[0].version >= 17
+    halves = {
+        each.name for each in model.graph.initializer if each.data_type == onnx.TensorProto.FLOAT16
+    }
+    norms = [node for node in model.graph.node if node.op_type == 'LayerNormalization']
+    assert len(norms) == 6
+    assert not any(set(node.input) & halves for node in norms)
+    assert halves
+
+
+def test_the_true_size_clipseg_runs_ten_of_twelve_layers_and_agrees(tmp_path: Path) -> None:
+    model = random_clipseg('rd64')
+    folder = tmp_path / 'clipseg-rd64'
+    frames = sources_frames(1)
+    agreement = build_bundle(from_model('rd64', 'clipseg', model), folder, frames=frames)
+    assert agreement.difference <= verify.MOST_DIFFERENCE
+    assert layers_of(folder / 'image_encoder.onnx') == {str(layer) for layer in range(10)}
+    outputs = onnx.load(str(folder / 'image_encoder.onnx')).graph.output
+    sizes = [[size.dim_value for size in each.type.tensor_type.shape.dim] for each in outputs]
+    assert sizes == [[1, 485, 64]] * 3
+    segmenter = ClipSegSegmenter(Bundle.load(folder), TERMS, SegmentationParameters(threads=2))
+    segmenter.prepare(PROMPT)
+    before = dict(segmenter.calls)
+    heatmaps = [segmenter.segment(frame, PROMPT) for frame in (frames[0], frames[0])]
+    calls = {role: segmenter.calls[role] - before[role] for role in before}
+    assert calls == {'image_encoder': 2, 'text_encoder': 0, 'decoder': 2}
+    assert heatmaps[0].safety.shape == (352, 352)
+    assert heatmaps[0].safety.std() > 0.01
+
+
+def test_the_true_size_clip_agrees(tmp_path: Path) -> None:
+    folder = tmp_path / 'clip-vit-b-32'
+    source = from_model('clip', 'clip', random_clip('ViT-B/32'))
+    agreement = build_bundle(source, folder, frames=sources_frames(1))
+    assert agreement.difference <= verify.MOST_DIFFERENCE
+    encoder = ClipEncoder(Bundle.load(folder), threads=2)
+    assert encoder.image_embedding(sources_frames(1)[0]).shape == (512,)
+
+
+def sources_frames(count: int) -> list[Frame]:
+    return build.pictures.draw_pictures(count)
+
+
+def test_a_bundle_that_does_not_agree_leaves_the_old_one(
+    small_clip: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / 'clip'
+    source = from_model('small', 'clip', small_clip)
+    build_bundle(source, folder)
+    old = Bundle.load(folder).checksum
+    poor = verify.Agreement(0.5, 0.9, 1.0)
+    monkeypatch.setattr(build, 'compare', lambda *_: poor)
+    with pytest.raises(BundleError, match=r'does not agree .* at most 0\.001'):
+        build_bundle(source, folder)
+    assert Bundle.load(folder).checksum == old
+    assert [each.name for each in tmp_path.iterdir()] == ['clip']
+
+
+def test_a_full_disk_leaves_the_old_one(
+    small_clip: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / 'clip'
+    source = from_model('small', 'clip', small_clip)
+    build_bundle(source, folder)
+
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    monkeypatch.setattr(build, '_write_manifest', full)
+    with pytest.raises(BundleError, match=r'No space left on device; .* free some space'):
+        build_bundle(source, folder)
+    assert Bundle.load(folder)
+    assert [each.name for each in tmp_path.iterdir()] == ['clip']
+
+
+def test_a_local_folder_is_a_source(small_clip: Any, tmp_path: Path) -> None:
+    small_clip.save_pretrained(tmp_path / 'hub')
+    source = load_source(str(tmp_path / 'hub'))
+    assert source.family == 'clip'
+    assert source.input.width == 64
+    assert build_bundle(source, tmp_path / 'clip').cosine > 0.9999
+
+
+def test_a_checkpoint_with_missing_weights_is_refused(small_clip: Any, tmp_path: Path) -> None:
+    state = small_clip.state_dict()
+    del state['visual_projection.weight']
+    small_clip.save_pretrained(tmp_path / 'hub', state_dict=state)
+    with pytest.raises(BundleError, match=r'1 weights are missing .*visual_projection'):
+        load_source(str(tmp_path / 'hub'))
+
+
+def test_another_family_is_refused(tmp_path: Path) -> None:
+    (tmp_path / 'config.json').write_text('{"model_type": "bert"}')
+    with pytest.raises(BundleError, match="of the family 'bert'; this exporter takes clip"):
+        load_source(str(tmp_path))
+
+
+def test_a_name_that_cannot_be_fetched_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    def offline(*_: Any, **__: Any) -> None:
+        raise OSError('We could not connect to the hub')
+
+    monkeypatch.setattr(sources.AutoConfig, 'from_pretrained', offline)
+    with pytest.raises(BundleError, match=r'could not connect .* or give a folder'):
+        load_source('someone/some-model')
+
+
+def test_the_terms_of_a_random_network_differ() -> None:
+    model = random_clipseg('rd16')
+    torch = pytest.importorskip('torch')
+    ids = torch.tensor([[49406, 320, 1125, 49407], [49406, 530, 518, 49407]])
+    pixels = torch.randn(1, 3, 352, 352).expand(2, -1, -1, -1)
+    with torch.inference_mode():
+        logits = model(input_ids=ids, pixel_values=pixels).logits.numpy()
+    assert np.abs(logits[0] - logits[1]).mean() > 0.05

@@ -1,0 +1,91 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""OpenAI's and OpenCLIP's names for the weights of CLIP lead to the same network."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+torch = pytest.importorskip('torch')
+pytest.importorskip('transformers')
+safetensors = pytest.importorskip('safetensors.torch')
+
+from peace_ros.domain import BundleError  # noqa: E402
+from peace_ros.inference.export.openclip import is_openclip, load_openclip  # noqa: E402
+
+pytestmark = pytest.mark.export
+
+TOWERS = (('visual.', 'vision_model'), ('', 'text_model'))
+
+
+def as_openclip(model: Any) -> dict[str, Any]:
+    """Write the weights of a CLIPModel under OpenCLIP's names."""
+    have = model.state_dict()
+    state = {
+        'visual.class_embedding': have['vision_model.embeddings.class_embedding'],
+        'visual.conv1.weight': have['vision_model.embeddings.patch_embedding.weight'],
+        'visual.positional_embedding': have['vision_model.embeddings.position_embedding.weight'],
+        'visual.proj': have['visual_projection.weight'].T.contiguous(),
+        'token_embedding.weight': have['text_model.embeddings.token_embedding.weight'],
+        'positional_embedding': have['text_model.embeddings.position_embedding.weight'],
+        'text_projection': have['text_projection.weight'].T.contiguous(),
+        'logit_scale': have['logit_scale'],
+    }
+    for kind in ('weight', 'bias'):
+        state[f'visual.ln_pre.{kind}'] = have[f'vision_model.pre_layrnorm.{kind}']
+        state[f'visual.ln_post.{kind}'] = have[f'vision_model.post_layernorm.{kind}']
+        state[f'ln_final.{kind}'] = have[f'text_model.final_layer_norm.{kind}']
+        for prefix, tower in TOWERS:
+            for index in range(2):
+                ours = f'{tower}.encoder.layers.{index}'
+                theirs = f'{prefix}transformer.resblocks.{index}'
+                parts = [have[f'{ours}.self_attn.{each}_proj.{kind}'] for each in 'qkv']
+                state[f'{theirs}.attn.in_proj_{kind}'] = torch.cat(parts)
+                for a, b in (
+                    ('attn.out_proj', 'self_attn.out_proj'),
+                    ('ln_1', 'layer_norm1'),
+                    ('ln_2', 'layer_norm2'),
+                    ('mlp.c_fc', 'mlp.fc1'),
+                    ('mlp.c_proj', 'mlp.fc2'),
+                ):
+                    state[f'{theirs}.{a}.{kind}'] = have[f'{ours}.{b}.{kind}']
+    return {name: tensor.clone() for name, tensor in state.items()}
+
+
+@pytest.mark.parametrize('form', ['file', 'safetensors', 'folder'])
+def test_the_network_is_the_same(small_clip: Any, tmp_path: Path, form: str) -> None:
+    state = as_openclip(small_clip)
+    if form == 'file':
+        path = tmp_path / 'model.pt'
+        torch.save({'state_dict': {f'module.{key}': each for key, each in state.items()}}, path)
+    elif form == 'safetensors':
+        path = tmp_path / 'model.safetensors'
+        safetensors.save_file(state, str(path))
+    else:
+        path = tmp_path
+        safetensors.save_file(state, str(path / 'open_clip_model.safetensors'))
+        config = {'model_cfg': {'quick_gelu': True}}
+        (path / 'open_clip_config.json').write_text(json.dumps(config))
+    assert is_openclip(path)
+    model = load_openclip(path)
+    assert model.config.vision_config.hidden_act == ('quick_gelu' if form == 'folder' else 'gelu')
+    for name, tensor in small_clip.state_dict().items():
+        torch.testing.assert_close(model.state_dict()[name], tensor)
+
+
+def test_a_damaged_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / 'cut.pt'
+    path.write_bytes(b'PK\x03\x04 cut short')
+    with pytest.raises(BundleError, match=r'not a readable checkpoint .* download it again'):
+        load_openclip(path)
+
+
+def test_a_convolutional_clip_is_refused(small_clip: Any, tmp_path: Path) -> None:
+    state = as_openclip(small_clip) | {'visual.layer1.0.conv1.weight': torch.zeros(1)}
+    torch.save(state, tmp_path / 'rn50.pt')
+    with pytest.raises(BundleError, match='no CLIP with a vision transformer'):
+        load_openclip(tmp_path / 'rn50.pt')
