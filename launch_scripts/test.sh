@@ -5,7 +5,7 @@
 # All checks of the project: style, types, import rules, unit tests, and a landing with the real
 # processes over DDS and MAVLink. Sets itself up; works on a fresh machine.
 #
-#   launch_scripts/test.sh               everything but the training tests
+#   launch_scripts/test.sh               everything but the tests of training and export
 #   launch_scripts/test.sh --training    these too (installs torch)
 #   launch_scripts/test.sh --quick       without the landing
 #   anything else is handed to pytest
@@ -17,7 +17,7 @@ extras=wheels,test
 pytest_arguments=()
 for argument in "$@"; do
     case $argument in
-    --training) extras=wheels,test,train ;;
+    --training) extras=wheels,test,train,export ;;
     --quick) pytest_arguments+=(-m 'not integration') ;;
     -h | --help)
         sed -n '5,12s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
