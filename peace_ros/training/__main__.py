@@ -32,7 +32,7 @@ class _Screen:
 
 def main(
     out: Annotated[Path, typer.Option(help='Folder that gets clip-small and clipseg-small.')],
-    minutes: Annotated[float, typer.Option(help='Minutes of training of both together.')] = 40.0,
+    minutes: Annotated[float, typer.Option(help='Minutes of training of both together.')] = 85.0,
     steps: Annotated[
         int | None, typer.Option(help='Steps of each network in place of minutes; repeatable.')
     ] = None,
@@ -43,10 +43,10 @@ def main(
     work: Annotated[
         Path, typer.Option(help='Folder of scenes, checkpoints and curves; continues from it.')
     ] = Path('training_run'),
-    scenes: Annotated[int, typer.Option(help='Number of drawn scenes.')] = 400,
+    scenes: Annotated[int, typer.Option(help='Number of drawn scenes.')] = 2000,
     threads: Annotated[int, typer.Option(help='CPU threads.')] = 2,
 ) -> None:
-    """Train the bundled models from scratch and write their bundles."""
+    """Train the bundled models and write their bundles."""
     torch.set_num_threads(threads)
     cv2.setNumThreads(1)
     columns = (

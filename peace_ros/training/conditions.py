@@ -12,6 +12,7 @@ import numpy as np
 
 from peace_ros.domain import Label
 from peace_ros.simulation.drawing import apply_condition
+from peace_ros.training.degradations import WAYS, degrade
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,6 +26,8 @@ _RENDERED_FRAMES: Words = ('screen', 'game', 'animation', 'screenshot')
 _PAINTED_FRAMES: Words = (
     'drawing', 'art', 'artwork', 'painting', 'illustration', 'cartoon', 'manga',
 )  # fmt: skip
+_CLEAR = ('plain', 'sunny', 'summer')
+"""Looks in which nothing stands between the camera and the ground."""
 _SEASONS = ('spring', 'summer', 'autumn', 'winter')
 
 
@@ -43,7 +46,7 @@ class Condition:
 _LOOKS: tuple[tuple[float, Condition], ...] = (
     (1.2, Condition('blurred', ('blurred',), (), (), ('blurry',))),
     (1.0, Condition('night', (), (), ('night', 'dark'))),
-    (0.5, Condition('dark', (), (), ('dark',))),
+    (0.8, Condition('dark', (), (), ('dark', 'night'))),
     (0.6, Condition('evening', (), (), ('evening',), ('dusk',))),
     (0.4, Condition('morning', (), (), ('morning',), ('dawn',))),
     (0.3, Condition('afternoon', (), (), ('afternoon',))),
@@ -53,18 +56,18 @@ _LOOKS: tuple[tuple[float, Condition], ...] = (
     (0.8, Condition('rainy', (), (), ('rainy', 'damp'), ('rain', 'wet'))),
     (0.4, Condition('damp', (), (), ('damp',), ('wet',))),
     (0.6, Condition('sunny', (), (), ('sunny', 'bright'))),
-    (0.4, Condition('bright', (), (), ('bright',))),
+    (0.6, Condition('bright', (), (), ('bright', 'sunny'))),
     (0.7, Condition('cloudy', (), (), ('cloudy',), ('overcast', 'gloomy'))),
-    (0.7, Condition('rendered', ('rendered', '3D rendered'), _RENDERED_FRAMES, ())),
+    (1.0, Condition('rendered', ('rendered', '3D rendered'), _RENDERED_FRAMES, ())),
     (0.5, Condition('3D', ('3D', '3D rendered'), _RENDERED_FRAMES, ())),
     (0.5, Condition('painted', ('rendered',), _PAINTED_FRAMES, ())),
     (0.3, Condition('heat', (), (), ('heat',))),
-    (0.2, Condition('heat-map', (), (), ('heat-map',))),
+    (0.4, Condition('heat-map', (), (), ('heat-map',))),
     (0.3, Condition('winter', (), (), ('winter',))),
     (0.4, Condition('autumn', (), (), ('autumn',))),
     (0.3, Condition('spring', (), (), ('spring',))),
     (0.3, Condition('summer', (), (), ('summer',))),
-    (0.6, Condition('noise', (), (), (), ('noisy', 'noise', 'grainy', 'bad'))),
+    (1.0, Condition('noise', (), (), (), ('noisy', 'noise', 'grainy', 'bad'))),
 )
 _CHANCES = np.array([chance for chance, _ in _LOOKS]) / sum(chance for chance, _ in _LOOKS)
 
@@ -92,8 +95,11 @@ def complete(look: Condition, source: Source) -> Condition:
         environment = (source.season,)
     if not environment and not drawn:
         environment = ('summer', 'sunny', 'bright') if source.kind == 'drone' else ('map',)
+    plain = look.plain
+    if not drawn and look.name in _CLEAR:
+        plain = (*plain, 'clear', 'sharp', 'good')
     frame = look.frame or _PHOTO_FRAMES
-    return Condition(look.name, resolution, frame, environment, look.plain)
+    return Condition(look.name, resolution, frame, environment, plain)
 
 
 def apply(
@@ -105,6 +111,8 @@ def apply(
     """Return the image under a look, same shape and type; ``classes`` tell snow where to lie."""
     if condition.name == 'plain':
         return image
+    if condition.name in WAYS and rng.random() < 0.7:
+        return degrade(image, condition.name, rng)
     if condition.name == 'painted':
         return _painted(image, rng)
     if condition.name == 'heat-map':

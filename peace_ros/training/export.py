@@ -16,7 +16,7 @@ from onnx import TensorProto, helper, numpy_helper
 from torch import Tensor, nn
 from torch.nn import functional
 
-from peace_ros.training.batches import MEAN, STD
+from peace_ros.training.backbone import MEAN, STD
 from peace_ros.training.networks import (
     EMBEDDING_WIDTH,
     FEATURE_CHANNELS,

@@ -72,15 +72,17 @@ def train(
     folder: Path,
     name: str,
     report: Callable[[float, str], None],
+    slower: tuple[str, float] = ('', 1.0),
 ) -> dict[str, Tensor]:
     """Train in place and return the averaged weights.
 
     ``loss_of`` returns named losses; their sum is minimised. A checkpoint in ``folder`` is
     continued when one lies there. ``report`` gets the progress (0 to 1) and a line of figures.
+    Parameters whose names begin with ``slower[0]`` learn at this part of the rate: ``slower[1]``.
     """
     folder.mkdir(parents=True, exist_ok=True)
     checkpoint, curve = folder / f'{name}.pt', folder / f'{name}.csv'
-    optimiser = torch.optim.AdamW(model.parameters(), lr=peak_rate, weight_decay=0.02)
+    optimiser = torch.optim.AdamW(_groups(model, *slower), lr=peak_rate, weight_decay=0.02)
     average = Averaged(model)
     step, elapsed_s = 0, 0.0
     if checkpoint.exists():
@@ -98,7 +100,7 @@ def train(
     while budget.progress(step, elapsed_s) < 1.0:
         progress = budget.progress(step, elapsed_s)
         for group in optimiser.param_groups:
-            group['lr'] = learning_rate(peak_rate, progress)
+            group['lr'] = learning_rate(peak_rate, progress) * group['share']
         losses = loss_of(model, next(batches))
         total = torch.stack(list(losses.values())).sum()
         optimiser.zero_grad(set_to_none=True)
@@ -123,6 +125,15 @@ def train(
     batches.close()  # type: ignore[attr-defined]
     _save(checkpoint, model, optimiser, average, step, elapsed_s)
     return average.state
+
+
+def _groups(model: nn.Module, prefix: str, share: float) -> list[dict[str, Any]]:
+    slow = {name for name, _ in model.named_parameters() if prefix and name.startswith(prefix)}
+    groups = (
+        ([value for name, value in model.named_parameters() if name not in slow], 1.0),
+        ([value for name, value in model.named_parameters() if name in slow], share),
+    )
+    return [{'params': values, 'share': part} for values, part in groups if values]
 
 
 def _save(

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The small networks: convolutional encoder, bag-of-words text tower, FiLM decoder, ranker."""
+"""The small networks: pyramid encoder, bag-of-words text tower, FiLM decoder, ranker."""
 
 from __future__ import annotations
 
@@ -10,11 +10,16 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from peace_ros.training.backbone import CHANNELS, Backbone
+
 EMBEDDING_WIDTH = 64
 FEATURE_CHANNELS = 48
+PYRAMID_CHANNELS = 64
 DECODER_HIDDEN = 8
 CLASS_COUNT = 9
 """Labels without UNLABELED; class index = label - 1."""
+_SCALES = 4
+_TONES = 10
 STRIDE = 4
 """Pixels of the image per cell of the feature map."""
 
@@ -50,39 +55,34 @@ class Residual(nn.Module):
 
 
 class ImageEncoder(nn.Module):
-    """RGB [B, 3, H, W] -> features [B, 48, H/4, W/4]; H and W are multiples of 16.
+    """RGB [B, 3, H, W] -> features [B, 48, H/4, W/4]; H and W are multiples of 32.
 
-    Residual stages at strides 4, 8 and 16, a global context vector, and a feature pyramid down
-    to stride 4.
+    A pretrained backbone, a global context vector, and a feature pyramid down to stride 4, into
+    which the half-size map is folded for the sake of small things.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self.stem = ConvBn(3, 20, stride=2)
-        self.stage4 = nn.Sequential(ConvBn(20, 32, stride=2), Residual(32))
-        self.stage8 = nn.Sequential(ConvBn(32, 72, stride=2), Residual(72), Residual(72))
-        self.stage16 = nn.Sequential(
-            ConvBn(72, 144, stride=2),
-            Residual(144),
-            Residual(144, dilation=2),
-            Residual(144, dilation=4),
-        )
-        self.context = nn.Linear(144, 144)
-        self.lateral16 = ConvBn(144, FEATURE_CHANNELS, kernel=1)
-        self.lateral8 = ConvBn(72, FEATURE_CHANNELS, kernel=1)
-        self.lateral4 = ConvBn(32, FEATURE_CHANNELS, kernel=1)
-        self.smooth8 = ConvBn(FEATURE_CHANNELS, FEATURE_CHANNELS)
-        self.smooth4 = ConvBn(FEATURE_CHANNELS, FEATURE_CHANNELS)
+        self.backbone = Backbone()
+        wide = PYRAMID_CHANNELS
+        self.context = nn.Linear(CHANNELS[32], wide)
+        self.lateral32 = ConvBn(CHANNELS[32], wide, kernel=1)
+        self.lateral16 = ConvBn(CHANNELS[16], wide, kernel=1)
+        self.lateral8 = ConvBn(CHANNELS[8], wide, kernel=1)
+        self.lateral4 = ConvBn(CHANNELS[4], wide, kernel=1)
+        self.fold2 = ConvBn(CHANNELS[2], wide, stride=2)
+        self.smooth16 = ConvBn(wide, wide)
+        self.smooth8 = ConvBn(wide, wide)
+        self.smooth4 = ConvBn(wide, FEATURE_CHANNELS)
 
     def forward(self, pixels: Tensor) -> Tensor:
         """Encode normalised images."""
-        at4 = self.stage4(self.stem(pixels))
-        at8 = self.stage8(at4)
-        at16 = self.stage16(at8)
-        context = self.context(at16.mean(dim=(2, 3)))
-        at16 = functional.relu(at16 + context[:, :, None, None])
-        mid = self.smooth8(self.lateral8(at8) + _double(self.lateral16(at16)))
-        return cast('Tensor', self.smooth4(self.lateral4(at4) + _double(mid)))
+        at = self.backbone(pixels)
+        context = self.context(at[32].mean(dim=(2, 3)))
+        x = self.lateral32(at[32]) + context[:, :, None, None]
+        x = self.smooth16(self.lateral16(at[16]) + _double(x))
+        x = self.smooth8(self.lateral8(at[8]) + _double(x))
+        return cast('Tensor', self.smooth4(self.lateral4(at[4]) + self.fold2(at[2]) + _double(x)))
 
 
 def _double(x: Tensor) -> Tensor:
@@ -180,35 +180,52 @@ class RankerImage(nn.Module):
     """RGB [B, 3, 224, 224] -> embedding [B, D].
 
     What tells night from fog and blur from sharp is low-level: the tower reads means and spreads
-    of its shallow layers beside statistics of colour and gradient.
+    of the shallow maps of a pretrained backbone, beside statistics of colour, and of gradients at
+    several scales.
     """
 
     def __init__(self, width: int = EMBEDDING_WIDTH) -> None:
         super().__init__()
-        self.layers = nn.ModuleList(
-            [
-                ConvBn(3, 16, stride=2),
-                ConvBn(16, 32, stride=2),
-                ConvBn(32, 48, stride=2),
-                ConvBn(48, 64, stride=2),
-            ]
-        )
-        statistics = 2 * (16 + 32 + 48 + 64) + 12
+        self.backbone = Backbone(deepest=8)
+        shallow = sum(CHANNELS[stride] for stride in self.backbone.strides)
+        statistics = 2 * shallow + 2 * 3 + _SCALES * 4 * 3 + 2 * _TONES
         self.norm = nn.BatchNorm1d(statistics)
-        self.head = nn.Sequential(nn.Linear(statistics, 128), nn.ReLU(), nn.Linear(128, width))
+        self.head = nn.Sequential(
+            nn.Linear(statistics, 192), nn.ReLU(), nn.Dropout(0.1), nn.Linear(192, width)
+        )
 
     def forward(self, pixels: Tensor) -> Tensor:
         """Embed normalised images."""
-        parts = [*_moments(pixels)]
-        right = (pixels[:, :, :, 1:] - pixels[:, :, :, :-1]).abs()
-        down = (pixels[:, :, 1:, :] - pixels[:, :, :-1, :]).abs()
-        parts += [right.mean(dim=(2, 3)), down.square().mean(dim=(2, 3)).clamp(min=1e-8).sqrt()]
-        x = pixels
-        for layer in self.layers:
-            x = layer(x)
-            parts += _moments(x)
+        parts = [*_moments(pixels), *_tones(pixels)]
+        scaled = pixels
+        for _ in range(_SCALES):
+            right = (scaled[:, :, :, 1:] - scaled[:, :, :, :-1]).abs()
+            down = (scaled[:, :, 1:, :] - scaled[:, :, :-1, :]).abs()
+            for slope in (right, down):
+                parts += [
+                    slope.mean(dim=(2, 3)).clamp(min=1e-4).log(),
+                    slope.square().mean(dim=(2, 3)).clamp(min=1e-8).log(),
+                ]
+            scaled = functional.avg_pool2d(scaled, 2)
+        for level in self.backbone(pixels).values():
+            parts += _moments(level)
         out = self.head(self.norm(torch.cat(parts, dim=1)))
         return cast('Tensor', out / (out.square().sum(dim=1, keepdim=True) + 1e-8).sqrt())
+
+
+def _tones(pixels: Tensor) -> tuple[Tensor, Tensor]:
+    """Return soft histograms [B, tones] of brightness and of colourfulness."""
+    brightness = pixels.mean(dim=1)
+    colour = pixels.amax(dim=1) - pixels.amin(dim=1)
+    histograms = []
+    for values, low, high in ((brightness, -1.0, 1.0), (colour, 0.0, 1.0)):
+        step = (high - low) / (_TONES - 1)
+        parts = [
+            (1.0 - (values - (low + tone * step)).abs() / step).clamp(min=0.0).mean(dim=(1, 2))
+            for tone in range(_TONES)
+        ]
+        histograms.append(torch.stack(parts, dim=1))
+    return histograms[0], histograms[1]
 
 
 def _moments(x: Tensor) -> tuple[Tensor, Tensor]:

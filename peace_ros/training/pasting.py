@@ -129,6 +129,39 @@ def paste_person(
     classes[whole > 0] = Label.PERSON
 
 
+def paste_standing_person(
+    image: Image, classes: Image, rng: np.random.Generator, gsd_m: float, sun: NDArray[np.float64]
+) -> None:
+    """Paste a person seen from aside, as cameras that look ahead or lean do: legs, body, head."""
+    height = rng.uniform(0.5, 1.7) / gsd_m
+    width = rng.uniform(0.3, 0.5) / gsd_m
+    if width < 1.0:
+        return
+    feet = np.array([rng.uniform(0, image.shape[1]), rng.uniform(0, image.shape[0])])
+    angle = rng.uniform(0, 2 * np.pi)
+    up = np.array([np.cos(angle), np.sin(angle)])
+    aside = np.array([-up[1], up[0]]) * width / 2
+    shadow = [feet + aside, feet - aside, feet + sun * 1.7 / gsd_m]
+    darken(image, np.array(shadow), rng.uniform(0.4, 0.65))
+    skin = (200.0, 165.0, 140.0) if rng.random() < 0.6 else (120.0, 85.0, 65.0)
+    whole = np.zeros(classes.shape, dtype=np.uint8)
+    parts = (
+        (0.25, 0.55, 0.35, tuple(float(v) for v in rng.uniform(10, 160, 3))),
+        (0.62, 0.5, 0.5, tuple(float(v) for v in rng.uniform(10, 245, 3))),
+        (0.93, 0.18, 0.25, skin),
+    )
+    for along, long, wide, colour in parts:
+        middle = feet + up * along * height
+        box = (
+            (float(middle[0]), float(middle[1])),
+            (max(1.2, long * height), max(1.2, 2 * wide * width)),
+            float(np.degrees(angle)),
+        )
+        cv2.ellipse(image, box, colour, -1, cv2.LINE_AA)
+        cv2.ellipse(whole, box, 1, -1)
+    classes[whole > 0] = Label.PERSON
+
+
 def paste_roof(
     image: Image, classes: Image, rng: np.random.Generator, gsd_m: float, sun: NDArray[np.float64]
 ) -> None:
@@ -186,6 +219,24 @@ def paste_water(image: Image, classes: Image, rng: np.random.Generator) -> None:
     classes[inside] = Label.WATER
 
 
+def _crown(
+    rng: np.random.Generator, centre: NDArray[np.float64], radius: float
+) -> NDArray[np.float64]:
+    """Return the outline of a crown: a few lobes, and raggedness that is finer."""
+    angles = np.linspace(0, 2 * np.pi, 72, endpoint=False)
+    wobble = np.ones(72)
+    for waves in range(2, 14):
+        size = 0.22 * waves**-0.8 * rng.normal()
+        wobble += size * np.cos(waves * angles + rng.uniform(0, 2 * np.pi))
+    wobble = radius * np.clip(wobble, 0.5, 1.6)
+    return centre + np.stack([np.cos(angles), np.sin(angles)], axis=1) * wobble[:, None]
+
+
+def _mirrored(index: NDArray[np.int64], size: int) -> NDArray[np.int64]:
+    folded = index % (2 * size)
+    return np.minimum(folded, 2 * size - 1 - folded)
+
+
 def paste_tree(
     image: Image,
     classes: Image,
@@ -198,16 +249,16 @@ def paste_tree(
     height, side = image.shape[:2]
     radius = float(np.clip(rng.uniform(1.2, 6.0) / gsd_m, 3.0, 0.25 * side))
     centre = np.array([rng.uniform(0, side), rng.uniform(0, height)])
-    angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
-    wobble = radius * (1.0 + rng.normal(0, 0.14, 24))
-    ring = centre + np.stack([np.cos(angles), np.sin(angles)], axis=1) * wobble[:, None]
+    ring = _crown(rng, centre, radius)
     darken(image, ring + sun * rng.uniform(3, 9) / gsd_m, rng.uniform(0.3, 0.6))
     mask = _mask(image.shape, ring)
-    patch = cv2.resize(foliage, (2 * int(radius * 1.6) + 2,) * 2, interpolation=cv2.INTER_AREA)
-    top, left = np.round(centre).astype(int) - patch.shape[0] // 2
+    # Leaves keep their size; a crown larger than the patch sees it mirrored.
+    zoom = rng.uniform(0.7, 1.4)
+    patch = cv2.resize(foliage, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_LINEAR)
     rows, columns = np.nonzero(mask)
+    shift = rng.integers(0, 4096, 2)
     leaves = patch[
-        np.clip(rows - top, 0, patch.shape[0] - 1), np.clip(columns - left, 0, patch.shape[1] - 1)
+        _mirrored(rows + shift[0], patch.shape[0]), _mirrored(columns + shift[1], patch.shape[1])
     ].astype(np.float32)
     if rng.random() < 0.45:
         colour = np.array(_jittered(rng, _CROWN_COLOURS, 12), dtype=np.float32)

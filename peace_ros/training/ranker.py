@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+from peace_ros.training.backbone import load_pretrained
 from peace_ros.training.batches import Batch, BatchMaker
 from peace_ros.training.networks import Ranker
 from peace_ros.training.text import (
@@ -29,12 +30,13 @@ if TYPE_CHECKING:
 
 BATCH_SIZE = 24
 VIEW_PX = 224
-PEAK_RATE = 4e-3
-_SHARES = {'drawn': 0.6, 'satellite': 0.1, 'drone': 0.3}
+PEAK_RATE = 3e-3
+PRETRAINED = ('image.backbone.', 0.1)
+_SHARES = {'drawn': 0.35, 'satellite': 0.2, 'drone': 0.45}
 
 _PLAIN_WORDS = (
     'blurry', 'foggy', 'mist', 'misty', 'haze', 'hazy', 'snow', 'rain', 'wet', 'dusk', 'dawn',
-    'overcast', 'gloomy', 'noisy', 'noise', 'grainy', 'bad',
+    'overcast', 'gloomy', 'noisy', 'noise', 'grainy', 'bad', 'clear', 'sharp', 'good',
 )  # fmt: skip
 _PHRASES = (
     '{}', '{}', '{}', 'A {} image', 'a {} photo', 'A {} image.', 'an image in {}', 'A {} view',
@@ -43,9 +45,11 @@ _PHRASES = (
 
 
 def create_ranker(seed: int) -> Ranker:
-    """Return an untrained ranker whose weights follow from the seed."""
+    """Return a ranker that knows ImageNet; its other weights follow from the seed."""
     torch.manual_seed(seed + 1)
-    return Ranker(len(vocabulary()))
+    model = Ranker(len(vocabulary()))
+    load_pretrained(model.image.backbone)
+    return model
 
 
 def create_maker(

@@ -41,7 +41,7 @@ class Recipe:
     steps: int | None = None
     """Steps of each network in place of minutes; the result then depends on the seed alone."""
     seed: int = 0
-    scenes: int = 400
+    scenes: int = 2000
     validation_scenes: int = 60
     batch_size: int = segmenter.BATCH_SIZE
     view_px: int = segmenter.VIEW_PX
@@ -94,6 +94,7 @@ def _train_ranker(
         folder=recipe.work,
         name='ranker',
         report=lambda progress, line: report('ranker', progress, line),
+        slower=ranker.PRETRAINED,
     )
     return cast('Ranker', with_weights(model, state))
 
@@ -117,6 +118,7 @@ def _train_segmenter(
         folder=recipe.work,
         name='segmenter',
         report=lambda progress, line: report('segmenter', progress, line),
+        slower=segmenter.PRETRAINED,
     )
     return cast('Segmenter', with_weights(model, state))
 
@@ -134,7 +136,8 @@ def _provenance(recipe: Recipe, sources: list[Source]) -> str:
     real = sum(source.kind != 'drawn' for source in sources)
     length = f'{recipe.steps} steps' if recipe.steps else f'{recipe.minutes:g} minutes on two cores'
     text = (
-        f'Trained from scratch with peace_ros.training (torch {torch.__version__}, seed '
+        f'Trained with peace_ros.training, from EfficientNet-Lite0 weights (Apache-2.0; ImageNet) '
+        f'in the segmenter (torch {torch.__version__}, seed '
         f'{recipe.seed}, {length}) on {recipe.scenes} scenes drawn by peace_ros'
     )
     if real:

@@ -25,8 +25,10 @@ if TYPE_CHECKING:
 FRAME_PX = 352
 """Side of the segmenter's input; frame sides below are given for it."""
 SCENE_PX = 512
-GSD_RANGE_M = (0.02, 0.45)
-"""A 73 degree view of 352 px from 5 m to 107 m height."""
+GSD_RANGE_M = (0.02, 0.5)
+"""A 73 degree view of 352 px from 5 m to 120 m height."""
+_BUILT_UP = ('suburb', 'city', 'village', 'park', 'riverside', 'industrial')
+"""Layouts with most to tell apart; two scenes in five are made one of these."""
 VALIDATION_SEED = 10_000_000
 """Scenes with seeds from here on are never trained on."""
 
@@ -132,7 +134,11 @@ def _cached_scene(job: tuple[str, int, int]) -> None:
     rng = np.random.default_rng([seed, 77])
     low, high = np.log(GSD_RANGE_M[0]), np.log(GSD_RANGE_M[1])
     gsd_m = float(np.exp(rng.uniform(low, high)))
-    scene = draw_scene(seed, size_px, gsd_m)
+    built_up = rng.random() < 0.4
+    layout = _BUILT_UP[int(rng.integers(len(_BUILT_UP)))] if built_up else None
+    if seed >= VALIDATION_SEED:
+        layout = None
+    scene = draw_scene(seed, size_px, gsd_m, layout=layout)
     partial = f'{path}.part.npz'
     np.savez(
         partial,

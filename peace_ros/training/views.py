@@ -14,6 +14,7 @@ from peace_ros.domain import Label
 from peace_ros.training import pasting
 from peace_ros.training.conditions import Condition, apply, pick_condition
 from peace_ros.training.sources import FRAME_PX
+from peace_ros.training.textures import NO_MATERIALS, Materials, cover, match_look
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -102,10 +103,11 @@ def _paste(
         most = int(np.clip(gsd_m * image.shape[0] / 5.0, 2, 9))
         for _ in range(int(rng.integers(1, most))):
             pasting.paste_car(image, classes, rng, gsd_m, sun)
-    if rng.random() < (0.5 if real else 0.3):
-        for _ in range(int(rng.integers(1, 10))):
-            pasting.paste_person(image, classes, rng, gsd_m, sun)
-    if rng.random() < 0.25:
+    if rng.random() < 0.5:
+        for _ in range(int(rng.integers(1, 12))):
+            seen_from = pasting.paste_person, pasting.paste_standing_person
+            seen_from[int(rng.random() < 0.35)](image, classes, rng, gsd_m, sun)
+    if rng.random() < 0.15:
         for _ in range(int(rng.integers(1, 4))):
             centre = rng.uniform(0, image.shape[0], 2)
             ring = centre + rng.normal(0, image.shape[0] / 6, (7, 2))
@@ -120,7 +122,7 @@ def jitter(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uin
     gain, lift = np.exp(rng.normal(0, 0.18)), rng.normal(0, 0.04)
     channels = []
     for _ in range(3):
-        tone = np.exp(rng.normal(0, 0.07))
+        tone = np.exp(rng.normal(0, 0.06))
         channels.append(np.clip(steps**gamma * gain * tone + lift, 0, 1) * 255.0)
     table = np.stack(channels, axis=1).astype(np.uint8)[None]
     out = cv2.LUT(image, table)
@@ -140,34 +142,22 @@ def jitter(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uin
     return np.ascontiguousarray(out, dtype=np.uint8)
 
 
-def cut_foliage(sources: Sequence[Source], rng: np.random.Generator) -> list[NDArray[np.uint8]]:
-    """Cut squares that hold nothing but trees out of the drone images."""
-    patches = []
-    for source in sources:
-        if source.kind != 'drone':
-            continue
-        for image, classes in zip(source.images_rgb, source.classes, strict=True):
-            height, width = classes.shape
-            for _ in range(120):
-                side = int(rng.integers(48, 128))
-                top, left = rng.integers(0, height - side), rng.integers(0, width - side)
-                window = (slice(top, top + side), slice(left, left + side))
-                if (classes[window] == Label.TREE).all():
-                    patches.append(image[window])
-    return patches
-
-
 def sample_view(
     source: Source,
     rng: np.random.Generator,
     size_px: int,
     *,
     condition_chance: float = 0.3,
-    foliage: Sequence[NDArray[np.uint8]] = (),
+    materials: Materials = NO_MATERIALS,
 ) -> View:
-    """Draw one augmented training view of a source; ``foliage`` are tree textures to paste."""
+    """Draw one augmented training view of a source, some of it in materials of real images."""
     image, classes, gsd_m = cut(source, rng, size_px)
-    _paste(source, image, classes, rng, gsd_m, foliage)
+    drawn = source.kind == 'drawn'
+    if drawn and rng.random() < 0.5:
+        image = cover(image, classes, rng, materials)
+    _paste(source, image, classes, rng, gsd_m, materials.textures.get(Label.TREE, ()))
+    if rng.random() < (0.35 if drawn else 0.1):
+        image = match_look(image, rng, materials)
     image = jitter(image, rng)
     condition = pick_condition(rng, source, condition_chance)
     return View(apply(condition, image, classes, rng), classes, condition)
