@@ -44,6 +44,8 @@ class Telemetry:
     landed: bool | None = None
     status_text: str = ''
     """The newest STATUSTEXT."""
+    battery_remaining: float | None = None
+    """Part of the battery that is left, 0 to 1; None where the autopilot does not say."""
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,11 @@ class Decision:
     counts: Mapping[str, int] = field(default_factory=dict)
     """Heatmaps by fate: used, or the reason of the rejection."""
     outcome: str | None = None
-    """`handover`, `no_zone`, `timeout` or `aborted` once it is over."""
+    """`handover`, `no_zone`, `timeout`, `battery` or `aborted` once it is over."""
     time_in_state_s: float = 0.0
     failed_sites: int = 0
+    """Places that are left out because they failed."""
+    attempts: int = 0
+    """Descents that failed."""
+    relaxed: bool = False
+    """The threshold has sunk below its parameter, which only the parameter relaxation allows."""

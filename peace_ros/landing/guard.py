@@ -9,10 +9,10 @@ climb never becomes a descent, and the most restrictive limit wins.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import hypot, isfinite
+from math import hypot, inf, isfinite
 
-from peace_ros.domain import Pose, Setpoint
-from peace_ros.landing.parameters import LandingParameters
+from peace_ros.domain import Pose, Setpoint, Site
+from peace_ros.landing.parameters import CELL_SCORE_FLOOR, LandingParameters
 
 _NS = 1e-9
 _STEP_LIMIT_S = 0.5
@@ -33,10 +33,16 @@ class GuardInput:
     map_age_s: float
     home: tuple[float, float] | None
     """North and east of where the landing began."""
+    site: Site | None = None
+    """The SITE of the verdict, None without one."""
+    ground_score: float = 0.0
+    """Worst safety score of the map under the vehicle and its radius; 0 is unknown."""
+    ground_age_s: float = inf
+    """Age of the oldest look at that ground."""
 
 
 class Guard:
-    """Limits speed, growth of speed, floor, fence and ages of data."""
+    """Limits speed, growth of speed, floor, fence, ages of data, and what descent is above."""
 
     def __init__(self, parameters: LandingParameters) -> None:
         self._p = parameters
@@ -47,7 +53,8 @@ class Guard:
         """Return what may be flown, and a note for each limit that acted."""
         notes: list[str] = []
         allowed = wish
-        for rule in (_finite, self._ages, self._floor, self._speed, self._fence):
+        rules = (_finite, self._ages, self._ground, self._floor, self._speed, self._fence)
+        for rule in rules:
             limited, note = rule(allowed, given)
             if limited != allowed:
                 notes.append(note)
@@ -59,10 +66,28 @@ class Guard:
         return limited, tuple(notes)
 
     def _ages(self, wish: Setpoint, given: GuardInput) -> tuple[Setpoint, str]:
-        if given.pose is None or not given.telemetry_age_s <= self._p.telemetry_age_limit_s:
+        pose = given.pose
+        if pose is None or not given.telemetry_age_s <= self._p.telemetry_age_limit_s:
             return Setpoint(wish.stamp_ns), 'stopped: telemetry is missing or old'
+        if not isfinite(pose.north_m) or not isfinite(pose.east_m):
+            return Setpoint(wish.stamp_ns), 'stopped: the position is not a number'
         if wish.v_down_m_s > 0.0 and not given.map_age_s <= self._p.descent_heatmap_age_limit_s:
             return replace(wish, v_down_m_s=0.0), 'descent stopped: the map is old'
+        return wish, ''
+
+    def _ground(self, wish: Setpoint, given: GuardInput) -> tuple[Setpoint, str]:
+        """Down only within the clearance of a SITE, on ground that the map has just seen safe."""
+        if wish.v_down_m_s <= 0.0 or given.pose is None:
+            return wish, ''
+        site = given.site
+        if site is None or not (
+            site.distance_m(given.pose) + self._p.safety_radius_m <= site.clearance_m
+        ):
+            return replace(wish, v_down_m_s=0.0), 'descent stopped: no site under the vehicle'
+        if not given.ground_score >= CELL_SCORE_FLOOR:
+            return replace(wish, v_down_m_s=0.0), 'descent stopped: the ground below is not safe'
+        if not given.ground_age_s <= self._p.descent_heatmap_age_limit_s:
+            return replace(wish, v_down_m_s=0.0), 'descent stopped: the ground below is not in view'
         return wish, ''
 
     def _floor(self, wish: Setpoint, given: GuardInput) -> tuple[Setpoint, str]:

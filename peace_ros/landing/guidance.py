@@ -33,6 +33,8 @@ class Situation:
     search_target: tuple[float, float] | None
     """Where the search goes next (north, east); None while it looks."""
     search_altitude_m: float
+    home: tuple[float, float] | None = None
+    """Where the landing began (north, east)."""
 
 
 def over_site(pose: Pose, site: Site, radius_m: float) -> bool:
@@ -146,12 +148,24 @@ def _search(situation: Situation, parameters: LandingParameters) -> tuple[Setpoi
     return Setpoint(situation.stamp_ns, north, east, -up), 'flying an expanding square'
 
 
+def _return(situation: Situation, parameters: LandingParameters) -> tuple[Setpoint, str]:
+    """Up to where lateral motion meets nothing, then straight home."""
+    if situation.home is None:
+        return Setpoint(situation.stamp_ns), 'where the landing began is not known'
+    if not situation.at_safe_altitude:
+        return _climb(situation, parameters)
+    p = parameters
+    north, east = _towards(situation.pose, *situation.home, p.gain, p.search_speed)
+    return Setpoint(situation.stamp_ns, north, east), ''
+
+
 _FLIGHTS: dict[State, Callable[[Situation, LandingParameters], tuple[Setpoint, str]]] = {
     State.AIMING: _aim,
     State.LANDING: _land,
     State.CLIMBING: _climb,
     State.SEARCHING: _search,
     State.RESTARTING: _search,
+    State.RETURNING: _return,
 }
 """States that move; every other one stands still."""
 

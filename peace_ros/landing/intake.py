@@ -1,6 +1,10 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which heatmaps reach the map, and with which pose."""
+"""Which heatmaps reach the map, and with which pose; and when the map is worthless.
+
+A map rests on where the vehicle was. When the position jumps, or for a while nothing tells it, what
+lies where is not known any more, and the map is dropped rather than guessed.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,12 @@ from collections import Counter, deque
 
 import numpy as np
 
-from peace_ros.domain import Camera, Heatmap, ImageError, Pose, VehicleError
+from peace_ros.domain import Camera, Frame, Heatmap, ImageError, Pose
+from peace_ros.landing.odometry import PositionCarrier, has_position
 from peace_ros.landing.parameters import LandingParameters
-from peace_ros.landing.poses import Miss, PoseHistory
-from peace_ros.mapping import SafetyMap
+from peace_ros.landing.picture_watch import PictureWatch
+from peace_ros.landing.poses import Miss, PoseHistory, jump_m
+from peace_ros.mapping import RefusedLookError, SafetyMap
 
 _PENDING_LIMIT = 4
 
@@ -26,26 +32,70 @@ class HeatmapIntake:
         self._camera = camera
         self._map = safety_map
         self._poses = PoseHistory(parameters.pose_gap_limit_s)
+        self._carrier = PositionCarrier(camera, parameters.pose_gap_limit_s, safety_map)
+        self._pictures = PictureWatch()
         self._pending: deque[Heatmap] = deque()
         self._waiting_since_ns: dict[int, int] = {}
         self._clock_ns: int | None = None
         self.counts: Counter[str] = Counter()
         """Heatmaps by fate: `used`, or the reason of a rejection."""
-        self.last_rejection = ''
+        self._last_rejection = self._drop_reason = ''
+        self.drops = 0
+        """How often the map was dropped; what was concluded from it is void then."""
+
+    @property
+    def last_rejection(self) -> str:
+        """Why there is no newer map: why it was dropped, or the last heatmap rejected."""
+        return self._drop_reason or self._last_rejection
 
     def clear(self) -> None:
         """Forget poses and waiting heatmaps; counts stay."""
         self._poses.clear()
+        self._carrier.clear()
         self._pending.clear()
         self._waiting_since_ns.clear()
         self._clock_ns = None
 
     def add_pose(self, pose: Pose) -> None:
-        """Keep a pose and use the heatmaps that waited for it."""
-        if not self._poses.add(pose):
+        """Keep a pose and use the heatmaps that waited for it.
+
+        While north and east are NaN only attitude and altitude are known.
+        """
+        if not has_position(pose):
+            kept = self._carrier.add_pose(pose)
+        else:
+            before = self._poses.newest
+            kept = self._poses.add(pose)
+            if kept and before is not None:
+                self._watch_jump(before, pose)
+            kept = kept and self._carrier.add_pose(pose)
+        if not kept:
             self.counts['pose rejected'] += 1
             return
         self._settle()
+
+    def add_view(self, frame: Frame) -> None:
+        """Keep the picture of a frame, so that it can stand in for the position."""
+        if self._carrier.add_view(frame):
+            self._settle()
+
+    def _watch_jump(self, before: Pose, pose: Pose) -> None:
+        jumped_m = jump_m(before, pose)
+        if jumped_m == 0.0:
+            return
+        self._drop_map(f'the position jumped by {jumped_m:.1f} m')
+        # Heatmaps still on their way belong to the frame of before.
+        self._poses.clear()
+        self._poses.add(pose)
+
+    def _drop_map(self, reason: str) -> None:
+        self._carrier.forget_way()
+        if self._map.stamp_ns is None:
+            return
+        self._map.clear()
+        self.drops += 1
+        self.counts['map dropped'] += 1
+        self._drop_reason = f'{reason}, so the map was dropped'
 
     def add_heatmap(self, heatmap: Heatmap) -> None:
         """Use a heatmap, let it wait for its pose, or reject it."""
@@ -74,13 +124,33 @@ class HeatmapIntake:
             if now_ns - since_ns <= limit_ns:
                 break
             self._drop(Miss.NOT_YET.value)
+        self._watch_position(now_ns)
+
+    def _watch_position(self, now_ns: int) -> None:
+        newest = self._poses.newest
+        told_ns = max(0 if newest is None else newest.stamp_ns, self._carrier.newest_ns or 0)
+        gap_s = (now_ns - told_ns) * 1e-9
+        if gap_s > self._map.parameters.position_gap_limit_s:
+            self._drop_map(f'no position for {gap_s:.1f} s')
 
     def _is_future(self, heatmap: Heatmap, now_ns: int) -> bool:
         return heatmap.stamp_ns > now_ns + round(self._p.future_tolerance_s * 1e9)
 
+    def _pose_at(self, stamp_ns: int) -> Pose | Miss:
+        pose = self._poses.at(stamp_ns)
+        if not self._carrier.is_carrying:
+            return pose
+        # A position that has come back counts once pictures have confirmed it.
+        before_gap = isinstance(pose, Pose) and stamp_ns < (self._carrier.newest_ns or 0)
+        return pose if before_gap else self._carrier.at(stamp_ns)
+
     def _settle(self) -> None:
+        lost = self._carrier.settle(self._poses)
+        if lost:
+            self._drop_map(lost)
+            self._poses.clear()
         while self._pending:
-            pose = self._poses.at(self._pending[0].stamp_ns)
+            pose = self._pose_at(self._pending[0].stamp_ns)
             if pose is Miss.NOT_YET:
                 return
             if isinstance(pose, Miss):
@@ -88,14 +158,19 @@ class HeatmapIntake:
                 continue
             heatmap = self._pending.popleft()
             self._forget_wait(heatmap)
+            problem = self._pictures.problem(heatmap, pose)
+            if problem:
+                self._reject(problem)
+                continue
             try:
                 self._map.add(heatmap, self._camera, pose)
             except ImageError:
                 self._reject('values outside of 0 to 1')
-            except VehicleError:
-                self._reject('taken too low above ground')
+            except RefusedLookError as refusal:
+                self._reject(refusal.fate)
             else:
                 self.counts['used'] += 1
+                self._drop_reason = ''
 
     def _drop(self, reason: str) -> None:
         self._forget_wait(self._pending.popleft())
@@ -106,4 +181,4 @@ class HeatmapIntake:
 
     def _reject(self, reason: str) -> None:
         self.counts[reason] += 1
-        self.last_rejection = reason
+        self._last_rejection = reason

@@ -42,6 +42,7 @@ def decision_pairs(decision: Decision, pose: Pose | None) -> dict[str, str]:
         'verdict_reason': decision.verdict.reason,
         'guard': '; '.join(decision.guard_notes),
         'failed_sites': str(decision.failed_sites),
+        'attempts': str(decision.attempts),
         **{key: f'{number:.3f}' for key, number in numbers.items()},
         **{f'heatmaps/{fate}': str(count) for fate, count in sorted(decision.counts.items())},
     }

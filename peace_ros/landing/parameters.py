@@ -38,6 +38,13 @@ class LandingParameters:
         low=0.05,
         high=2.0,
     )
+    handover_error_m: float = parameter(
+        1.0,
+        'HANDOVER only this near to the middle of the site (and within its clearance).',
+        unit='m',
+        low=0.2,
+        high=20.0,
+    )
     altitude_limit_m: float = parameter(
         500.0, 'Altitudes beyond this are not believed.', unit='m', low=50.0, high=5000.0
     )
@@ -84,19 +91,28 @@ class LandingParameters:
         low=SAFETY_THRESHOLD_FLOOR,
         high=0.98,
     )
+    relaxation: bool = parameter(
+        False,
+        'Let the threshold sink while nothing is found, as the conservative gain of DOVESEI does; '
+        'off: it stays, and NO_ZONE is the answer.',
+    )
     relaxed_threshold: float = parameter(
         0.7,
-        'The threshold sinks to this while SEARCHING finds nothing (released: until 10 % of the '
-        'image is safe, however unsafe that is; here never below a fixed floor).',
+        'With relaxation the threshold sinks to this (released: until 10 % of the image is safe, '
+        'however unsafe that is; here never below a fixed floor).',
         low=SAFETY_THRESHOLD_FLOOR,
         high=0.98,
     )
     relax_after_s: float = parameter(
-        60.0, 'Time over which the threshold sinks.', unit='s', low=1.0, high=1200.0
+        60.0,
+        'With relaxation: time without a site over which the threshold sinks.',
+        unit='s',
+        low=1.0,
+        high=1200.0,
     )
     dynamic_threshold: float = parameter(
         0.10,
-        'The threshold does not sink while this part of the known ground is safe.',
+        'With relaxation: the threshold does not sink while this part of the known ground is safe.',
         low=0.0,
         high=1.0,
     )
@@ -114,10 +130,32 @@ class LandingParameters:
         0.1, 'Part of the way that the focus and the site move per heatmap.', low=0.01, high=1.0
     )
     failed_site_radius_m: float = parameter(
-        8.0, 'No site is chosen this near to one that failed.', unit='m', low=0.0, high=200.0
+        8.0,
+        'No site is chosen this near to one that failed, nor within the clearance it had (up to '
+        'what is ample).',
+        unit='m',
+        low=0.0,
+        high=200.0,
+    )
+    failed_site_growth: float = parameter(
+        1.5,
+        'Each further failure within that radius multiplies the radius.',
+        low=1.0,
+        high=4.0,
+    )
+    failed_site_radius_limit_m: float = parameter(
+        60.0, 'The radius grows no farther.', unit='m', low=0.0, high=1000.0
     )
     failed_site_memory_s: float = parameter(
-        180.0, 'A failed site is forgiven after this.', unit='s', low=0.0, high=3600.0
+        1200.0,
+        'A failed site is forgiven after this (released: never remembered); a new engagement '
+        'forgets it too.',
+        unit='s',
+        low=0.0,
+        high=7200.0,
+    )
+    max_attempts: int = parameter(
+        4, 'Descents that may fail; then budget_policy decides.', low=1, high=100
     )
     # Motion
     gain: float = parameter(
@@ -194,9 +232,16 @@ class LandingParameters:
         low=0.0,
         high=2000.0,
     )
+    search_distance_m: float = parameter(
+        1500.0,
+        'Way that may be flown in search; then the answer is no_zone and budget_policy decides.',
+        unit='m',
+        low=0.0,
+        high=50000.0,
+    )
     max_search_s: float = parameter(
         300.0,
-        'Without any site for this long the answer is no_zone.',
+        'Without any site for this long the answer is no_zone and budget_policy decides.',
         unit='s',
         low=5.0,
         high=3600.0,
@@ -219,7 +264,32 @@ class LandingParameters:
         300.0, 'LANDING that takes longer than this has failed.', unit='s', low=10.0, high=1200.0
     )
     max_total_s: float = parameter(
-        1200.0, 'Everything ends in HOLD after this.', unit='s', low=10.0, high=7200.0
+        1200.0,
+        'Time of a whole landing; then budget_policy decides.',
+        unit='s',
+        low=10.0,
+        high=7200.0,
+    )
+    battery_reserve: float = parameter(
+        0.0,
+        'Part of the battery at which budget_policy decides; 0 leaves it to the failsafe of the '
+        'autopilot, which alone knows its battery.',
+        low=0.0,
+        high=0.9,
+    )
+    budget_policy: str = parameter(
+        'hold',
+        'When time, battery, way or attempts are used up: hold where it is; return to where the '
+        'landing began and hold there; best_site makes one last attempt at the best place known, '
+        'under all the usual checks, and holds when that fails.',
+        choices=('hold', 'return', 'best_site'),
+    )
+    policy_time_s: float = parameter(
+        180.0,
+        'A policy other than hold has this long, then it holds.',
+        unit='s',
+        low=1.0,
+        high=1200.0,
     )
     # Ages of data
     heatmap_age_limit_s: float = parameter(
@@ -252,6 +322,7 @@ class LandingParameters:
         self._in_order('handover_altitude_m', 'safe_altitude_m')
         self._in_order('relaxed_threshold', 'safety_threshold')
         self._in_order('preferred_clearance_m', 'ample_clearance_m')
+        self._in_order('failed_site_radius_m', 'failed_site_radius_limit_m')
         self._in_order('landing_focus', 'aiming_focus')
         self._in_order('descent_heatmap_age_limit_s', 'heatmap_age_limit_s')
         self._in_order('z_min_speed_landing', 'z_speed_landing')

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, isfinite
+from math import ceil, hypot, isfinite, pi
 from typing import cast
 
 import cv2
@@ -36,8 +36,8 @@ class Search:
     threshold: float
     required_clearance_m: float
     age_limit_s: float
-    failed: tuple[tuple[float, float], ...] = ()
-    """North and east of sites that failed."""
+    failed: tuple[tuple[float, float, float], ...] = ()
+    """North, east and radius in metres of places that failed."""
     incumbent: Site | None = None
     """The present choice, kept unless another is clearly better."""
 
@@ -93,14 +93,14 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
         return Verdict.no_zone(
             'no ground in the focus is safe' if known else 'nothing is known yet'
         )
+    for north, east, radius in search.failed:
+        inside &= ~layers.disc(north, east, radius)
     kept = _keep(ground, search, inside, parameters)
     wide = inside & (ground.clearance_m >= search.required_clearance_m)
-    for north, east in search.failed:
-        wide &= ~layers.disc(north, east, parameters.failed_site_radius_m)
     if not wide.any():
         if kept is not None:
             return Verdict.found(_site_at(ground, *kept))
-        largest = float(ground.clearance_m[inside].max())
+        largest = float(ground.clearance_m[inside].max(initial=0.0))
         return Verdict.no_zone(
             f'the widest safe ground has {largest:.1f} m of clearance and '
             f'{search.required_clearance_m:.1f} m are needed'
@@ -127,24 +127,43 @@ def _value(
 ) -> NDArray[np.float32]:
     """Return the worth of every candidate cell, 0 elsewhere.
 
-    In the spirit of DOVESEI's area / perimeter / (distance + 1) per contour: wide components
-    rather than thin ones, near ones rather than far ones, and within them clearance up to what
-    is ample.
+    In the spirit of DOVESEI's area / perimeter / (distance + 1) per contour: large and compact
+    components rather than small and thin ones, near ones rather than far ones, and within them
+    clearance up to what is ample, and confidence.
     """
     _, labels = cv2.connectedComponents(candidates.astype(np.uint8), connectivity=4)
-    inner = cv2.erode(candidates.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    area = np.bincount(labels.ravel())
-    rim = np.bincount(labels[candidates & ~inner], minlength=area.size)
-    half_width_m = area / np.maximum(rim, 1) * ground.layers.cell_m
-    shape = (half_width_m + 1.0) / (half_width_m + 4.0)
     north, east = ground.layers.distances_m(search.pose.north_m, search.pose.east_m)
     distance = np.sqrt(north * north + east * east)
     worth = np.minimum(ground.clearance_m, parameters.ample_clearance_m)
-    worth = (
-        worth * shape.astype(np.float32)[labels] / (1.0 + distance / parameters.distance_scale_m)
-    )
+    worth = worth * _shapes(candidates, labels, ground.layers.cell_m)[labels]
+    worth = worth * _confidence(ground.layers, search.required_clearance_m)
+    worth = worth / (1.0 + distance / parameters.distance_scale_m)
     result: NDArray[np.float32] = np.where(candidates, worth, np.float32(0.0)).astype(np.float32)
     return result
+
+
+def _shapes(
+    candidates: NDArray[np.bool_], labels: NDArray[np.int32], cell_m: float
+) -> NDArray[np.float32]:
+    """Return a factor below 1 per component: half width (area / perimeter) and compactness.
+
+    Compactness is the isoperimetric quotient, 1 for a disc; it weighs little, since a long lawn
+    is as safe as a round one of its width.
+    """
+    inner = cv2.erode(candidates.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    area = np.bincount(labels.ravel())
+    rim = np.maximum(np.bincount(labels[candidates & ~inner], minlength=area.size), 1)
+    half_width_m = area / rim * cell_m
+    compact = np.minimum(1.0, 4.0 * pi * area / (rim * rim))
+    factor = (half_width_m + 1.0) / (half_width_m + 4.0) * (0.8 + 0.2 * compact)
+    return cast('NDArray[np.float32]', factor.astype(np.float32))
+
+
+def _confidence(layers: MapLayers, radius_m: float) -> NDArray[np.float32]:
+    """Return the mean safety score around every cell, squared: doubt costs more than distance."""
+    size = 2 * ceil(radius_m / layers.cell_m) + 1
+    mean = cv2.blur(layers.score, (size, size), borderType=cv2.BORDER_REPLICATE)
+    return cast('NDArray[np.float32]', mean * mean)
 
 
 def _worth(
@@ -154,7 +173,9 @@ def _worth(
     north, east = ground.layers.centre_of(*cell)
     distance = hypot(north - search.pose.north_m, east - search.pose.east_m)
     enough = min(float(ground.clearance_m[cell]), parameters.ample_clearance_m)
-    return enough / (1.0 + distance / parameters.distance_scale_m)
+    near = ground.layers.disc(north, east, search.required_clearance_m)
+    confidence = float(ground.layers.score[near].mean())
+    return enough * confidence**2 / (1.0 + distance / parameters.distance_scale_m)
 
 
 def _keep(

@@ -4,6 +4,17 @@
 
 from peace_ros.mapping.layers import MapLayers
 from peace_ros.mapping.parameters import MapParameters
-from peace_ros.mapping.safety_map import SafetyMap
+from peace_ros.mapping.registration import Displacement, Mismatch, View, register, small_grey
+from peace_ros.mapping.safety_map import RefusedLookError, SafetyMap
 
-__all__ = ['MapLayers', 'MapParameters', 'SafetyMap']
+__all__ = [
+    'Displacement',
+    'MapLayers',
+    'MapParameters',
+    'Mismatch',
+    'RefusedLookError',
+    'SafetyMap',
+    'View',
+    'register',
+    'small_grey',
+]

@@ -16,7 +16,7 @@ class MapLayers:
     """Layers of one size; rows grow to the north, columns to the east, in the local NED frame."""
 
     score: NDArray[np.float32]
-    """Safety score, 0 to 1; 0 where nothing is known."""
+    """Safety score, 0 to 1; 0 where nothing is known and where a veto stands."""
     age_s: NDArray[np.float32]
     """Age of the newest look; infinite where nothing is known."""
     looks: NDArray[np.uint16]

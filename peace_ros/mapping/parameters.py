@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from peace_ros.domain import ConfigurationError
 from peace_ros.domain.parameters import check, parameter
 
 
@@ -63,5 +64,71 @@ class MapParameters:
         60.0, 'Rays that slant more than this are not believed.', unit='deg', low=5.0, high=80.0
     )
 
+    tilt_limit_deg: float = parameter(
+        40.0,
+        'Frames taken while the camera leans more than this are refused.',
+        unit='deg',
+        low=5.0,
+        high=80.0,
+    )
+    fine_memory_s: float = parameter(
+        60.0,
+        'The resolution at which a cell was seen counts half after this: until then a coarser '
+        'look cannot call ground safe that a finer one called unsafe.',
+        unit='s',
+        low=1.0,
+        high=3600.0,
+    )
+    # What moves in
+    veto_score: float = parameter(
+        0.25,
+        'A heatmap value up to this is clearly unsafe and closes the ground at once.',
+        low=0.0,
+        high=0.45,
+    )
+    veto_blob_m: float = parameter(
+        0.3,
+        'Smallest width of a clearly unsafe blob that closes ground (a person from above); never '
+        'less than two pixels.',
+        unit='m',
+        low=0.0,
+        high=5.0,
+    )
+    veto_pixel_m: float = parameter(
+        0.35,
+        'Heatmap pixels that are larger on the ground close nothing at once, for they cannot '
+        'tell a person from noise; their evidence still counts.',
+        unit='m',
+        low=0.01,
+        high=5.0,
+    )
+    clear_score: float = parameter(
+        0.6, 'A look with at least this heatmap value counts towards opening.', low=0.5, high=0.95
+    )
+    veto_looks: int = parameter(
+        3, 'Looks that open closed ground again, none of them coarser.', low=1, high=100
+    )
+    veto_s: float = parameter(
+        1.0,
+        'Ground stays closed for this long after the last clearly unsafe look, times the number '
+        'of such looks since it was open (up to 5).',
+        unit='s',
+        low=0.0,
+        high=120.0,
+    )
+    # Without position
+    position_gap_limit_s: float = parameter(
+        3.0,
+        'The map is dropped when for this long nothing said where the vehicle is.',
+        unit='s',
+        low=0.5,
+        high=60.0,
+    )
+
     def __post_init__(self) -> None:
         check(self)
+        if self.clear_score < self.neutral_score:
+            raise ConfigurationError(
+                f'parameter clear_score = {self.clear_score} must not be below neutral_score = '
+                f'{self.neutral_score}: unsafe ground would be opened'
+            )

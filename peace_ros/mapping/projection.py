@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from math import ceil, floor, radians, tan
+from math import acos, ceil, floor, radians, tan
 from typing import NamedTuple, cast
 
 import cv2
@@ -41,6 +41,14 @@ class Window(NamedTuple):
     rows: int
     columns: int
 
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """Rows and columns, to index a layer of the grid."""
+        return (
+            slice(self.row, self.row + self.rows),
+            slice(self.column, self.column + self.columns),
+        )
+
 
 def heatmap_from_ground(
     camera: Camera, pose: Pose, width_px: int, height_px: int
@@ -53,6 +61,12 @@ def heatmap_from_ground(
     sx, sy = width_px / camera.width_px, height_px / camera.height_px
     stretch = np.array([[sx, 0.0, 0.5 * (sx - 1.0)], [0.0, sy, 0.5 * (sy - 1.0)], [0.0, 0.0, 1.0]])
     return stretch @ ground_to_image(camera, pose)
+
+
+def tilt_rad(pose: Pose) -> float:
+    """Return the angle between the camera's axis (body-down) and the vertical, 0 to pi."""
+    _, x, y, _ = pose.quaternion_ned_frd
+    return acos(max(-1.0, min(1.0, 1.0 - 2.0 * (x * x + y * y))))
 
 
 def worst_part(safety: NDArray[np.uint8], pixels_per_cell: float) -> NDArray[np.uint8]:
@@ -98,15 +112,16 @@ def visible_window(
 
 def project(
     safety: NDArray[np.uint8],
-    believed: NDArray[np.uint8],
+    kinds: NDArray[np.uint8],
     image_from_ground: NDArray[np.float64],
     grid: GroundGrid,
-) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Sample a heatmap at the centres of ground cells.
 
     :param safety: height x width, 0 to 255.
-    :param believed: same shape, 255 where pixels count, else 0.
-    :return: safety per cell, and whether the cell is in view in front of the camera.
+    :param kinds: same shape, the kind of each pixel, 0 where it does not count.
+    :return: safety per cell and kind per cell; kind 0 also where a cell is not in view in front
+        of the camera.
     """
     # Destination pixel (x = column, y = row) to ground (north, east, 1).
     south, west = grid.south_m + 0.5 * grid.cell_m, grid.west_m + 0.5 * grid.cell_m
@@ -118,12 +133,13 @@ def project(
     sampled = cv2.warpPerspective(
         safety, matrix, (columns, rows), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     )
-    seen = cv2.warpPerspective(
-        believed, matrix, (columns, rows), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+    kind = cv2.warpPerspective(
+        kinds, matrix, (columns, rows), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
     )
     depth = (
         matrix[2, 0] * np.arange(columns)[None, :]
         + matrix[2, 1] * np.arange(rows)[:, None]
         + matrix[2, 2]
     )
-    return cast('NDArray[np.uint8]', sampled), (seen > 0) & (depth > 0.0)
+    kind[depth <= 0.0] = 0
+    return cast('NDArray[np.uint8]', sampled), cast('NDArray[np.uint8]', kind)

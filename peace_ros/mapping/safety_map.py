@@ -3,17 +3,18 @@
 """A ground grid in the local frame that gathers heatmaps, forgets, and follows the vehicle.
 
 Each cell holds log-odds of being safe, in the way of occupancy grids (Moravec and Elfes, 1985),
-with three differences that people on the ground ask for: evidence for unsafe weighs more and is
-kept longer, frames of one scene are not taken for independent, and a lower look outweighs a
-higher one.
+with four differences that people on the ground ask for: evidence for unsafe weighs more and is
+kept longer, frames of one scene are not taken for independent, a closer look outweighs any number
+of farther ones, and what looks clearly unsafe closes the ground at once (see ``veto``).
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from math import ceil, cos, exp, floor, log
-from typing import TypeVar
+from math import ceil, cos, degrees, exp, floor, log
+from typing import cast
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,23 +27,38 @@ from peace_ros.mapping.projection import (
     Window,
     heatmap_from_ground,
     project,
+    tilt_rad,
     visible_window,
     worst_part,
 )
+from peace_ros.mapping.shifting import shifted
+from peace_ros.mapping.veto import Veto, blobs
 
 LOWEST_LOOK_M = 1.0
 """From lower, a frame shows less ground than the vehicle covers, and a cell is the whole image."""
 _NS = 1e-9
 _NEVER_S = np.float32(-1e9)
 _LOOKS_LIMIT = 60_000
-_Cell = TypeVar('_Cell', bound=np.generic)
+_SEEN, _CLEARLY_UNSAFE = 1, 2
+"""Kinds of pixels; 0 is not believed."""
+_COARSER = 1.5
+"""A look whose pixels are this much larger on the ground does not contradict a finer one."""
+_MOST_HALVINGS = 60.0
+
+
+class RefusedLookError(VehicleError):
+    """A frame that cannot be projected; ``fate`` is the reason in a few words."""
+
+    def __init__(self, fate: str, sentence: str) -> None:
+        super().__init__(sentence)
+        self.fate = fate
 
 
 @lru_cache(maxsize=4)
 def _believed(width: int, height: int, border_fraction: float) -> NDArray[np.uint8]:
     mask = np.zeros((height, width), np.uint8)
     bx, by = round(border_fraction * width), round(border_fraction * height)
-    mask[by : height - by, bx : width - bx] = 255
+    mask[by : height - by, bx : width - bx] = _SEEN
     mask.setflags(write=False)
     return mask
 
@@ -62,10 +78,14 @@ class SafetyMap:
     def __init__(self, parameters: MapParameters | None = None) -> None:
         self.parameters = parameters or MapParameters()
         self._cells = max(1, round(self.parameters.map_size_m / self.parameters.map_cell_m))
+        self._veto = Veto(self.parameters, self._cells)
+        self.revision = -1
+        """Grows with every change."""
         self.clear()
 
     def clear(self) -> None:
         """Forget everything."""
+        self._veto.clear()
         shape = (self._cells, self._cells)
         self._log_odds = np.zeros(shape, np.float32)
         self._seen_s = np.full(shape, _NEVER_S, np.float32)
@@ -74,7 +94,7 @@ class SafetyMap:
         self._first_row = self._first_column = 0
         self._epoch_ns: int | None = None
         self._stamp_ns = 0
-        self.revision = 0
+        self.revision += 1
 
     @property
     def stamp_ns(self) -> int | None:
@@ -88,7 +108,8 @@ class SafetyMap:
         :param pose: where the camera was at the heatmap's stamp.
         :raises ImageError: on values that are not finite or not within 0 to 1, and on a stamp
             that is not newer than the last one.
-        :raises VehicleError: on a pose that is not finite or not above ground.
+        :raises RefusedLookError: (a VehicleError) on a pose that is not finite, not above ground or
+            leans too far.
         """
         self._check(heatmap, pose)
         self._follow(pose)
@@ -118,9 +139,17 @@ class SafetyMap:
             )
         numbers = (pose.north_m, pose.east_m, pose.altitude_agl_m, *pose.quaternion_ned_frd)
         if not np.all(np.isfinite(numbers)) or pose.altitude_agl_m < LOWEST_LOOK_M:
-            raise VehicleError(
+            raise RefusedLookError(
+                'taken too low above ground',
                 f'pose {numbers}: must be finite and {LOWEST_LOOK_M} m or more above ground to '
-                'project a heatmap'
+                'project a heatmap',
+            )
+        tilt_deg, limit_deg = degrees(tilt_rad(pose)), self.parameters.tilt_limit_deg
+        if tilt_deg > limit_deg:
+            raise RefusedLookError(
+                'taken at too much tilt',
+                f'camera at {tilt_deg:.0f} deg off the vertical: heatmaps are projected up to '
+                f'{limit_deg:.0f} deg; wait until the vehicle flies level',
             )
 
     def _follow(self, pose: Pose) -> None:
@@ -135,10 +164,27 @@ class SafetyMap:
         self._first_row, self._first_column = row, column
         if self._epoch_ns is None:
             return
-        self._log_odds = _shifted(self._log_odds, d_row, d_column, 0.0)
-        self._seen_s = _shifted(self._seen_s, d_row, d_column, float(_NEVER_S))
-        self._pixel_m = _shifted(self._pixel_m, d_row, d_column, float('inf'))
-        self._looks = _shifted(self._looks, d_row, d_column, 0)
+        self._log_odds = shifted(self._log_odds, d_row, d_column, 0.0)
+        self._seen_s = shifted(self._seen_s, d_row, d_column, float(_NEVER_S))
+        self._pixel_m = shifted(self._pixel_m, d_row, d_column, float('inf'))
+        self._looks = shifted(self._looks, d_row, d_column, 0)
+        self._veto.shift(d_row, d_column)
+
+    def widen_unsafe(self, distance_m: float) -> None:
+        """Let everything unsafe and unknown grow, because the map has lost accuracy.
+
+        :param distance_m: by how much; rounded up to whole cells.
+        """
+        reach = ceil(distance_m / self.parameters.map_cell_m)
+        if reach < 1 or self._epoch_ns is None:
+            return
+        size = (2 * reach + 1, 2 * reach + 1)
+        kernel = cast('NDArray[np.uint8]', cv2.getStructuringElement(cv2.MORPH_ELLIPSE, size))
+        self._log_odds = cast('NDArray[np.float32]', cv2.erode(self._log_odds, kernel))
+        self._seen_s = cast('NDArray[np.float32]', cv2.erode(self._seen_s, kernel))
+        self._looks = cast('NDArray[np.uint16]', cv2.erode(self._looks, kernel))
+        self._veto.widen(kernel)
+        self.revision += 1
 
     def _decay(self, elapsed_s: float) -> tuple[float, float]:
         p, elapsed_s = self.parameters, max(0.0, elapsed_s)
@@ -162,53 +208,71 @@ class SafetyMap:
             return 0
         grid = self._grid.part(window)
         nadir_pixel_m = pose.altitude_agl_m / camera.focal_px * camera.width_px / width
+        per_cell = grid.cell_m / nadir_pixel_m
         # Rounding down keeps the error on the side of unsafe.
-        quantised = worst_part(
-            (heatmap.safety * 255.0).astype(np.uint8), grid.cell_m / nadir_pixel_m
-        )
-        believed = _believed(width, height, p.border_fraction)
-        sampled, seen = project(quantised, believed, matrix, grid)
+        quantised = (heatmap.safety * 255.0).astype(np.uint8)
+        kinds = _believed(width, height, p.border_fraction)
+        unsafe = blobs(quantised, nadir_pixel_m, per_cell, p)
+        if unsafe is not None:
+            kinds = np.where((unsafe > 0) & (kinds > 0), np.uint8(_CLEARLY_UNSAFE), kinds)
+        sampled, kind = project(worst_part(quantised, per_cell), kinds, matrix, grid)
         north = (np.arange(grid.rows) + 0.5) * grid.cell_m + (grid.south_m - pose.north_m)
         east = (np.arange(grid.columns) + 0.5) * grid.cell_m + (grid.west_m - pose.east_m)
         ground_sq = np.add.outer(north * north, east * east).astype(np.float32)
         # Squared secant of the slant: slant distance over altitude, and the off-nadir limit.
         secant_sq = 1.0 + ground_sq / np.float32(pose.altitude_agl_m**2)
-        seen &= secant_sq <= 1.0 / cos(np.radians(p.off_nadir_limit_deg)) ** 2
+        kind[secant_sq > 1.0 / cos(np.radians(p.off_nadir_limit_deg)) ** 2] = 0
         pixel_m = np.float32(nadir_pixel_m) * secant_sq
         apart_s = p.independent_after_s
         weight = 1.0 if elapsed_s >= apart_s else elapsed_s / apart_s
-        self._gather(window, sampled, seen, pixel_m, weight)
-        return int(np.count_nonzero(seen))
+        self._gather(window, sampled, kind, pixel_m, weight)
+        return int(np.count_nonzero(kind))
 
     def _gather(
         self,
         window: Window,
         sampled: NDArray[np.uint8],
-        seen: NDArray[np.bool_],
+        kind: NDArray[np.uint8],
         pixel_m: NDArray[np.float32],
         weight: float,
     ) -> None:
         p = self.parameters
-        row, column, rows, columns = window
-        part = np.s_[row : row + rows, column : column + columns]
-        log_odds, cell_pixel_m = self._log_odds[part], self._pixel_m[part]
+        part, now_s, seen = window.slices, self._seconds(self._stamp_ns), kind > 0
+        log_odds = self._log_odds[part]
         evidence = _evidence_table(p.neutral_score, p.look_limit)[sampled]
-        finer = pixel_m / cell_pixel_m
-        # A finer look shrinks what was known from coarser ones; a coarser look adds less to safe.
+        finest_m = self._finest_pixel_m(part, now_s)
+        finer = pixel_m / finest_m
+        comparable = finer <= _COARSER
+        self._veto.take(
+            window,
+            unsafe=kind == _CLEARLY_UNSAFE,
+            clear=seen & comparable & (sampled >= p.clear_score * 255.0),
+            was_safe=seen & (log_odds > 0.0),
+            now_s=now_s,
+        )
+        # A finer look shrinks what was known from coarser ones; a coarser look adds less to safe
+        # and takes nothing away from unsafe: it may not even have seen what lies there.
         old = log_odds * np.minimum(finer, 1.0)
         with np.errstate(divide='ignore'):
             trust = weight * np.minimum(1.0, 1.0 / finer)
+        trust *= comparable | (log_odds >= 0.0)
         ceiling = np.minimum(p.safe_limit, p.repeat_limit * evidence)
         safer = np.maximum(old, np.minimum(old + trust * evidence, ceiling))
         worse = np.maximum(old + (weight * p.unsafe_weight) * evidence, -p.unsafe_limit)
         new = np.where(evidence >= 0.0, safer, worse)
         np.copyto(log_odds, new, where=seen)
-        # The memory of a fine look fades as coarser ones follow it.
-        slow = np.minimum(pixel_m, cell_pixel_m * np.float32(1.05))
-        np.copyto(cell_pixel_m, slow, where=seen)
-        np.copyto(self._seen_s[part], self._seconds(self._stamp_ns), where=seen)
+        np.copyto(self._pixel_m[part], np.minimum(pixel_m, finest_m), where=seen)
+        np.copyto(self._seen_s[part], now_s, where=seen)
         looks = self._looks[part]
         np.add(looks, 1, out=looks, where=seen & (looks < _LOOKS_LIMIT))
+
+    def _finest_pixel_m(self, part: tuple[slice, slice], now_s: float) -> NDArray[np.float32]:
+        """Return the finest pixels of late; they count as larger the longer ago they looked."""
+        halvings = (now_s - self._seen_s[part]) / np.float32(self.parameters.fine_memory_s)
+        finest: NDArray[np.float32] = self._pixel_m[part] * np.exp2(
+            np.minimum(halvings, np.float32(_MOST_HALVINGS))
+        )
+        return finest
 
     def _seconds(self, stamp_ns: int) -> float:
         return (stamp_ns - (self._epoch_ns or 0)) * _NS
@@ -234,6 +298,7 @@ class SafetyMap:
         )
         known = looks > 0
         score = np.where(known, 1.0 / (1.0 + np.exp(-aged)), 0.0).astype(np.float32)
+        score[self._veto.closed(rows, columns, self._seconds(now_ns))] = 0.0
         age = self._seconds(now_ns) - self._seen_s[rows, columns]
         age = np.where(known, age, np.inf).astype(np.float32)
         south_m = grid.south_m + rows.start * grid.cell_m
@@ -263,17 +328,3 @@ class SafetyMap:
             return 0.0, float('inf')
         inside = layers.disc(north_m, east_m, max(radius_m, cell))
         return float(layers.score[inside].min()), float(layers.age_s[inside].max())
-
-
-def _shifted(array: NDArray[_Cell], d_row: int, d_column: int, fill: float) -> NDArray[_Cell]:
-    """Return the array as seen from a window moved by whole cells."""
-    rows, columns = array.shape
-    moved = np.full_like(array, fill)
-    if abs(d_row) < rows and abs(d_column) < columns:
-        target = moved[
-            max(0, -d_row) : rows - max(0, d_row), max(0, -d_column) : columns - max(0, d_column)
-        ]
-        target[...] = array[
-            max(0, d_row) : rows - max(0, -d_row), max(0, d_column) : columns - max(0, -d_column)
-        ]
-    return moved

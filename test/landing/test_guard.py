@@ -2,24 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """The guard: only ever makes motion smaller, whatever is asked for."""
 
+from dataclasses import replace
 from math import copysign, hypot, inf, isfinite, nan
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from peace_ros.domain import Pose, Setpoint
+from peace_ros.domain import Pose, Setpoint, Site
 from peace_ros.landing import LandingParameters
 from peace_ros.landing.guard import Guard, GuardInput
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 P = LandingParameters(geofence_radius_m=50.0)
-LONG_NS = 10_000_000_000
+ASIDE = Site(0.0, 4.6, 6.0, 100.0, 0.9, 0.1)
 
 
 def seen(altitude_m=60.0, north_m=0.0, now_ns=0, telemetry_age_s=0.1, map_age_s=0.1) -> GuardInput:
     pose = Pose(0, north_m, 0.0, -altitude_m, LEVEL, altitude_m)
-    return GuardInput(now_ns, pose, telemetry_age_s, map_age_s, (0.0, 0.0))
+    below = Site(north_m, 0.0, 6.0, 100.0, 0.9, 0.1)
+    return GuardInput(now_ns, pose, telemetry_age_s, map_age_s, (0.0, 0.0), below, 0.9, map_age_s)
 
 
 def limited(wish: Setpoint, given_input: GuardInput, parameters=P):
@@ -27,13 +29,7 @@ def limited(wish: Setpoint, given_input: GuardInput, parameters=P):
     guard = Guard(parameters)
     for step in range(40):
         now_ns = given_input.now_ns + step * 500_000_000
-        given_now = GuardInput(
-            now_ns,
-            given_input.pose,
-            given_input.telemetry_age_s,
-            given_input.map_age_s,
-            given_input.home,
-        )
+        given_now = replace(given_input, now_ns=now_ns)
         result, notes = guard.limit(wish, given_now)
     return result, notes
 
@@ -104,6 +100,23 @@ def test_a_calm_wish_passes_untouched():
         (Setpoint(0, 1.0, 0.0, 2.0), seen(altitude_m=nan), (1.0, 0.0, 0.0), 'altitude'),
         (Setpoint(0, 1.0, 0.0, 2.0), seen(map_age_s=1.6), (1.0, 0.0, 0.0), 'map'),
         (Setpoint(0, 1.0, 0.0, 2.0), seen(map_age_s=inf), (1.0, 0.0, 0.0), 'map'),
+        (Setpoint(0, 1.0, 0.0, 2.0), replace(seen(), site=None), (1.0, 0.0, 0.0), 'no site'),
+        (Setpoint(0, 1.0, 0.0, 2.0), replace(seen(), site=ASIDE), (1.0, 0.0, 0.0), 'no site'),
+        (
+            Setpoint(0, 1.0, 0.0, 2.0),
+            replace(seen(), ground_score=0.4),
+            (1.0, 0.0, 0.0),
+            'not safe',
+        ),
+        (
+            Setpoint(0, 1.0, 0.0, 2.0),
+            replace(seen(), ground_score=nan),
+            (1.0, 0.0, 0.0),
+            'not safe',
+        ),
+        (Setpoint(0, 1.0, 0.0, 2.0), replace(seen(), ground_age_s=2.0), (1.0, 0.0, 0.0), 'in view'),
+        (Setpoint(0, 1.0, 0.0, -2.0), replace(seen(), site=None), (1.0, 0.0, -2.0), ''),
+        (Setpoint(0, 1.0, 0.0, 1.0), seen(north_m=nan), (0.0, 0.0, 0.0), 'position'),
         (Setpoint(0, 1.0, 0.0, 2.0), seen(telemetry_age_s=0.8), (0.0, 0.0, 0.0), 'telemetry'),
         (Setpoint(0, 3.0, 0.0, 0.0), seen(north_m=51.0), (0.0, 0.0, 0.0), 'fence'),
         (Setpoint(0, 3.0, 0.0, 0.0), seen(north_m=48.5), (1.0, 0.0, 0.0), 'fence'),

@@ -23,6 +23,8 @@ def test_no_configuration_crosses_the_floor_of_safety(name):
         {'relaxed_threshold': 0.9},
         {'preferred_clearance_m': 20.0},
         {'landing_focus': 8.0},
+        {'failed_site_radius_m': 80.0},
+        {'budget_policy': 'land anyway'},
         {'descent_heatmap_age_limit_s': 3.0},
         {'min_looks': 1},
     ],
@@ -39,6 +41,12 @@ def test_the_released_values():
     assert (p.giveup_after_s, p.search4new_place_s, p.max_total_s) == (5.0, 60.0, 1200.0)
 
 
+def test_what_weakens_or_extends_a_landing_is_off_until_asked_for():
+    p = LandingParameters()
+    assert p.relaxation is False
+    assert p.budget_policy == 'hold'
+
+
 def test_clearance_needed_grows_with_altitude():
     p = LandingParameters()
     assert p.required_clearance_m(100.0) > p.required_clearance_m(20.0) > p.safety_radius_m
@@ -48,8 +56,8 @@ def test_clearance_needed_grows_with_altitude():
 def test_every_parameter_is_described_and_bounded(parameters):
     for info in describe(parameters):
         assert info.description.endswith('.')
-        assert info.low is not None
-        assert info.high is not None
+        bounded = info.low is not None and info.high is not None
+        assert bounded or info.choices or isinstance(info.default, bool)
 
 
 def test_landing_and_map_share_no_name():

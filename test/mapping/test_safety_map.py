@@ -14,6 +14,7 @@ from peace_ros.mapping import MapParameters, SafetyMap
 S = 1_000_000_000
 CAMERA = Camera.from_degrees(352, 352, 73.0)
 SMALL = MapParameters(map_size_m=160.0)
+LEANING = MapParameters(map_size_m=160.0, tilt_limit_deg=80.0)
 
 
 def pose_of(altitude_m=60.0, north_m=0.0, east_m=0.0, *, roll=0.0, pitch=0.0, yaw=0.0) -> Pose:
@@ -135,7 +136,7 @@ def test_slanted_rays_and_the_border_of_the_image_are_not_believed():
     half_footprint_m = 60.0 * np.tan(radians(73.0 / 2.0))
     seen_m = np.count_nonzero(layers.looks.max(axis=0)) * layers.cell_m / 2.0
     assert 0.9 * half_footprint_m < seen_m < 0.97 * half_footprint_m
-    tilted = SafetyMap(SMALL)
+    tilted = SafetyMap(LEANING)
     tilted.add(even(0.9, 1.0), CAMERA, pose_of(20.0, pitch=50.0))
     layers = tilted.layers(S)
     north, _ = np.nonzero(layers.looks)
@@ -143,8 +144,8 @@ def test_slanted_rays_and_the_border_of_the_image_are_not_believed():
 
 
 def test_a_camera_that_looks_at_the_horizon_maps_nothing_behind_it():
-    safety_map = SafetyMap(SMALL)
-    safety_map.add(even(0.9, 1.0), CAMERA, pose_of(20.0, pitch=80.0))
+    safety_map = SafetyMap(LEANING)
+    safety_map.add(even(0.9, 1.0), CAMERA, pose_of(20.0, pitch=79.0))
     layers = safety_map.layers(S)
     rows, _ = np.nonzero(layers.looks)
     assert all(layers.centre_of(int(row), 0)[0] > 0.0 for row in set(rows))

@@ -112,6 +112,7 @@ def picture() -> Callable[[int], Any]:
     def make(at_ns: int, width: int = 64, height: int = 48) -> Any:
         pixels = np.zeros((height, width, 3), np.uint8)
         pixels[..., 1] = 120
+        pixels[: height // 2] += 30  # a picture of one colour is refused
         return image_message(pixels, 'rgb8', at_ns)
 
     return make

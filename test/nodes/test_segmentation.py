@@ -164,3 +164,15 @@ def test_a_garbage_prompt_is_said(bench):
     prompts = bench.offer(DiagnosticArray, 'prompt', qos.RESULT)
     bench.until(lambda: bool(diagnostics), lambda: prompts.publish(DiagnosticArray()))
     assert 'template' in diagnostics[0].status[0].message
+
+
+def test_a_covered_lens_gives_no_heatmap_and_says_why(bench, picture):
+    painter = Painter()
+    diagnostics = bench.heard(DiagnosticArray, '/diagnostics', qos.RESULT)
+    bench.run(SegmentationNode, painter, template='DD')
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    covered = picture(7)
+    covered.data = bytes(len(covered.data))
+    bench.until(lambda: bool(diagnostics), lambda: images.publish(covered))
+    assert 'one colour' in diagnostics[0].status[0].message
+    assert not painter.seen
