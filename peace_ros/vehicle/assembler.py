@@ -11,81 +11,117 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.domain.geometry import Quaternion, quaternion_from_euler
+from peace_ros.domain.geometry import Quaternion, quaternion_from_euler, yaw_from_quaternion
 from peace_ros.domain.motion import Pose, Telemetry
+from peace_ros.vehicle.clock import TimeMap
 from peace_ros.vehicle.dialects import Dialect
 from peace_ros.vehicle.parameters import VehicleParameters
+from peace_ros.vehicle.texts import StatusTexts
+from peace_ros.vehicle.trust import JumpWatch, Report
 
 MAX_EXTRAPOLATION_S = 0.3
 RANGE_LIMIT_S = 0.5
 REBOOT_MS = 1000
 """A boot time that goes back by more than this is a reboot."""
 MAX_POSES = 256
-MAX_TEXTS = 50
-CHUNK = 50
+ESTIMATOR_LIMIT_S = 3.0
+"""Age at which what the position filter said of itself is no longer known."""
+HOME_STEP_M = 1.0
+"""A home whose height changes by more than this in flight says nothing about the ground below."""
+KNOWS_POSITION = mavlink.ESTIMATOR_POS_HORIZ_REL | mavlink.ESTIMATOR_POS_HORIZ_ABS
+GUESSES_POSITION = mavlink.ESTIMATOR_CONST_POS_MODE
+IN_ORDER = frozenset({'LOCAL_POSITION_NED', 'ATTITUDE', 'ATTITUDE_QUATERNION'})
+"""Of these only the newest counts, whatever order they come in."""
+NUMBERS = {
+    'LOCAL_POSITION_NED': ('x', 'y', 'z', 'vx', 'vy', 'vz'),
+    'ATTITUDE': ('roll', 'pitch', 'yaw'),
+    'ATTITUDE_QUATERNION': ('q1', 'q2', 'q3', 'q4'),
+    'HOME_POSITION': ('z',),
+}
+"""Fields that must be numbers."""
 
 
 @dataclass(frozen=True)
 class _Position:
     steady_ns: int
-    boot_ms: int
-    north_m: float
-    east_m: float
-    down_m: float
-    v_m_s: tuple[float, float, float]
+    report: Report
 
 
 class Assembler:
-    """Keeps the newest of every part; values that are no numbers are counted, never used."""
+    """Keeps the newest of every part; values that are no numbers are counted, never used.
 
-    def __init__(self, dialect: Dialect, parameters: VehicleParameters) -> None:
+    Args:
+        dialect: Of the autopilot.
+        parameters: Limits, source of altitude.
+        clock: The autopilot's clock in terms of ours; None: poses get the moment of receipt.
+    """
+
+    def __init__(
+        self, dialect: Dialect, parameters: VehicleParameters, clock: TimeMap | None = None
+    ) -> None:
         self._dialect = dialect
         self._parameters = parameters
+        self._clock = clock or TimeMap()
+        self._watch = JumpWatch(parameters.jump_limit_m)
         self.poses: deque[Pose] = deque(maxlen=MAX_POSES)
-        self.texts: deque[tuple[int, str]] = deque(maxlen=MAX_TEXTS)
-        """(steady clock ns, STATUSTEXT)."""
+        self.texts = StatusTexts()
         self.rejected = 0
         """Messages with numbers that are none, or attitudes that are no rotation."""
+        self.late = 0
+        """Messages that came twice, or after a newer one."""
         self.reboots = 0
         self.arrived_ns: dict[int, int] = {}
         """Message id -> steady clock of the newest."""
         self.landed_state = 0
         """MAV_LANDED_STATE; 0 while it is not known."""
+        self.home_msl_m: float | None = None
+        """Altitude of home above sea level."""
         self._received_ns = 0
-        self._forget()
-        self._chunks: dict[int, str] = {}
-
-    def _forget(self) -> None:
-        self._position: _Position | None = None
-        self._pose: Pose | None = None
-        self._pose_ns = 0
-        self._home_down_m = 0.0
-        self._range: tuple[int, float] | None = None
-        self._boot_ms = 0
+        self._battery: float | None = None
         self._mode = ''
         self._armed = False
         self._heartbeat_ns: int | None = None
+        self._forget()
+
+    def _forget(self) -> None:
+        """Forget what a reboot makes worthless; mode and armed hold until the next HEARTBEAT."""
+        self._position: _Position | None = None
+        self._pose: Pose | None = None
+        self._pose_ns = 0
+        self._yaw_rad = 0.0
+        self._home_down_m: float | None = None
+        self._range: tuple[int, float] | None = None
+        self._boot_ms = 0
+        self._newest_boot_ms: dict[str, int] = {}
+        self._estimator: tuple[int, int] | None = None
         self.landed_state = 0
         self.arrived_ns.clear()
+        self._watch.forget()
+        self._clock.forget()
 
     def take(self, message: Any, stamp_ns: int, steady_ns: int) -> None:
         """Take one message of the believed autopilot.
 
         Args:
             message: A pymavlink message.
-            stamp_ns: Node clock at receipt; poses get it.
+            stamp_ns: Node clock at receipt.
             steady_ns: Steady clock at receipt.
         """
         self._received_ns = steady_ns
-        handler = _HANDLERS.get(message.get_type())
-        if handler is not None:
-            boot_ms = getattr(message, 'time_boot_ms', None)
-            if boot_ms is not None:
-                self._watch_boot(boot_ms)
-            if handler(self, message, stamp_ns, steady_ns):
-                self.arrived_ns[message.get_msgId()] = steady_ns
-            else:
-                self.rejected += 1
+        kind = message.get_type()
+        handler = _HANDLERS.get(kind)
+        if handler is None:
+            return
+        boot_ms = getattr(message, 'time_boot_ms', None)
+        if boot_ms is not None:
+            self._watch_boot(boot_ms)
+        if not _is_sane(kind, message):
+            self.rejected += 1
+        elif kind in IN_ORDER and self._is_late(kind, message.time_boot_ms):
+            self.late += 1
+        else:
+            handler(self, message, stamp_ns, steady_ns)
+            self.arrived_ns[message.get_msgId()] = steady_ns
 
     @property
     def mode(self) -> str:
@@ -97,17 +133,40 @@ class Assembler:
         """The armed bit of the newest HEARTBEAT."""
         return self._armed
 
+    @property
+    def yaw_rad(self) -> float:
+        """Newest heading, NED; it needs no position."""
+        return self._yaw_rad
+
+    def heartbeat_age_s(self, steady_ns: int) -> float:
+        """Return the time since the newest HEARTBEAT, infinite before the first."""
+        if self._heartbeat_ns is None:
+            return float('inf')
+        return (steady_ns - self._heartbeat_ns) / 1e9
+
+    def position_problem(self, steady_ns: int) -> str:
+        """Return why there is no position to fly by, empty when nothing speaks against it."""
+        flags = self._estimator_flags(steady_ns)
+        if flags is not None and (not flags & KNOWS_POSITION or flags & GUESSES_POSITION):
+            return (
+                f'the autopilot has no estimate of its position (filter flags 0x{flags:X}) and '
+                'refuses velocity set-points: it needs GNSS, external navigation or optical flow'
+            )
+        return self._watch.problem
+
     def telemetry(self, steady_ns: int) -> Telemetry:
-        """Return what is known now; a pose that is too old is None."""
+        """Return what is known now; a pose that is too old or not to be believed is None."""
         p = self._parameters
         pose = self._pose
-        if pose is not None and steady_ns - self._pose_ns > p.pose_limit_s * 1e9:
+        if (
+            pose is None
+            or steady_ns - self._pose_ns > p.pose_limit_s * 1e9
+            or self.position_problem(steady_ns)
+            or self._is_silent(steady_ns)
+        ):
             pose = None
-        velocity = self._position.v_m_s if self._position and pose else (0.0, 0.0, 0.0)
-        heard = (
-            self._heartbeat_ns is not None
-            and steady_ns - self._heartbeat_ns <= p.heartbeat_limit_s * 1e9
-        )
+        at = self._position
+        velocity = at.report.velocity_m_s if at and pose else (0.0, 0.0, 0.0)
         state = self.landed_state
         return Telemetry(
             received_ns=self._received_ns,
@@ -116,61 +175,72 @@ class Assembler:
             v_east_m_s=velocity[1],
             v_down_m_s=velocity[2],
             armed=self._armed,
-            in_control=heard and self._mode == self._dialect.control_mode,
+            in_control=self._mode == self._dialect.control_mode,
             mode=self._mode,
             landed=None if state == 0 else state == mavlink.MAV_LANDED_STATE_ON_GROUND,
-            status_text=self.texts[-1][1] if self.texts else '',
+            status_text=self.texts.newest,
+            battery_remaining=self._battery,
         )
+
+    def _is_silent(self, steady_ns: int) -> bool:
+        if self._heartbeat_ns is None:
+            return False
+        return self.heartbeat_age_s(steady_ns) > self._parameters.heartbeat_limit_s
+
+    def _estimator_flags(self, steady_ns: int) -> int | None:
+        if self._estimator is None:
+            return None
+        seen_ns, flags = self._estimator
+        return flags if steady_ns - seen_ns <= ESTIMATOR_LIMIT_S * 1e9 else None
 
     def _watch_boot(self, boot_ms: int) -> None:
         if boot_ms + REBOOT_MS < self._boot_ms:
             self.reboots += 1
-            mode, armed, heard = self._mode, self._armed, self._heartbeat_ns
             self._forget()
-            self._mode, self._armed, self._heartbeat_ns = mode, armed, heard
         self._boot_ms = max(self._boot_ms, boot_ms)
 
-    def _heartbeat(self, m: Any, _stamp_ns: int, steady_ns: int) -> bool:
+    def _is_late(self, kind: str, boot_ms: int) -> bool:
+        newest_ms = self._newest_boot_ms.get(kind, -1)
+        self._newest_boot_ms[kind] = max(newest_ms, boot_ms)
+        return boot_ms <= newest_ms
+
+    def _heartbeat(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
         self._mode = self._dialect.mode_name(m.custom_mode)
         self._armed = bool(m.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
         self._heartbeat_ns = steady_ns
-        return True
 
-    def _local_position(self, m: Any, _stamp_ns: int, steady_ns: int) -> bool:
-        if not all(isfinite(each) for each in (m.x, m.y, m.z, m.vx, m.vy, m.vz)):
-            return False
-        self._position = _Position(steady_ns, m.time_boot_ms, m.x, m.y, m.z, (m.vx, m.vy, m.vz))
-        return True
+    def _local_position(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
+        report = Report(m.time_boot_ms, (m.x, m.y, m.z), (m.vx, m.vy, m.vz))
+        in_control = self._armed and self._mode == self._dialect.control_mode
+        if self._watch.believes(report, in_control=in_control):
+            self._position = _Position(steady_ns, report)
 
-    def _euler(self, m: Any, stamp_ns: int, steady_ns: int) -> bool:
-        if not all(isfinite(each) for each in (m.roll, m.pitch, m.yaw)):
-            return False
-        self._make_pose(
-            quaternion_from_euler(m.roll, m.pitch, m.yaw), m.time_boot_ms, stamp_ns, steady_ns
-        )
-        return True
+    def _euler(self, m: Any, stamp_ns: int, steady_ns: int) -> None:
+        q = quaternion_from_euler(m.roll, m.pitch, m.yaw)
+        self._make_pose(q, m.time_boot_ms, stamp_ns, steady_ns)
 
-    def _quaternion(self, m: Any, stamp_ns: int, steady_ns: int) -> bool:
-        q = (m.q1, m.q2, m.q3, m.q4)
-        size = sqrt(sum(each * each for each in q))
-        if not 0.9 < size < 1.1:
-            return False
-        unit = (q[0] / size, q[1] / size, q[2] / size, q[3] / size)
+    def _quaternion(self, m: Any, stamp_ns: int, steady_ns: int) -> None:
+        size = _size(m)
+        unit = (m.q1 / size, m.q2 / size, m.q3 / size, m.q4 / size)
         self._make_pose(unit, m.time_boot_ms, stamp_ns, steady_ns)
-        return True
 
     def _make_pose(self, q: Quaternion, boot_ms: int, stamp_ns: int, steady_ns: int) -> None:
         """Bring the newest position to the moment of the attitude, by its velocity."""
+        self._yaw_rad = yaw_from_quaternion(q)
         at = self._position
         if at is None or steady_ns - at.steady_ns > self._parameters.pose_limit_s * 1e9:
             return
-        dt = (boot_ms - at.boot_ms) / 1000.0
+        if self.position_problem(steady_ns):
+            return
+        dt = (boot_ms - at.report.boot_ms) / 1000.0
         dt = max(-MAX_EXTRAPOLATION_S, min(MAX_EXTRAPOLATION_S, dt))
-        down = at.down_m + dt * at.v_m_s[2]
+        north, east, down = (
+            p + dt * v for p, v in zip(at.report.position_m, at.report.velocity_m_s, strict=True)
+        )
         self._pose = Pose(
-            stamp_ns=stamp_ns,
-            north_m=at.north_m + dt * at.v_m_s[0],
-            east_m=at.east_m + dt * at.v_m_s[1],
+            stamp_ns=self._clock.stamp_ns(boot_ms, stamp_ns),
+            north_m=north,
+            east_m=east,
             down_m=down,
             quaternion_ned_frd=q,
             altitude_agl_m=self._altitude_m(down, q, steady_ns),
@@ -179,7 +249,7 @@ class Assembler:
         self.poses.append(self._pose)
 
     def _altitude_m(self, down_m: float, q: Quaternion, steady_ns: int) -> float:
-        above_home = self._home_down_m - down_m
+        above_home = (self._home_down_m or 0.0) - down_m
         if self._parameters.altitude_source != 'rangefinder' or self._range is None:
             return above_home
         seen_ns, distance_m = self._range
@@ -187,36 +257,43 @@ class Assembler:
             return above_home
         return distance_m * max(0.0, 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2))
 
-    def _distance(self, m: Any, _stamp_ns: int, steady_ns: int) -> bool:
+    def _distance(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
         if m.orientation != mavlink.MAV_SENSOR_ROTATION_PITCH_270:
-            return True
+            return
         in_range = m.min_distance < m.current_distance < m.max_distance
         self._range = (steady_ns, m.current_distance / 100.0) if in_range else None
-        return True
 
-    def _home(self, m: Any, _stamp_ns: int, _steady_ns: int) -> bool:
-        if not isfinite(m.z):
-            return False
+    def _home(self, m: Any, _stamp_ns: int, _steady_ns: int) -> None:
+        flying = self._armed and self.landed_state != mavlink.MAV_LANDED_STATE_ON_GROUND
+        known_m = self._home_down_m
+        if flying and known_m is not None and abs(m.z - known_m) > HOME_STEP_M:
+            self.rejected += 1
+            return
         self._home_down_m = m.z
-        return True
+        self.home_msl_m = m.altitude / 1000.0
 
-    def _landed(self, m: Any, _stamp_ns: int, _steady_ns: int) -> bool:
+    def _landed(self, m: Any, _stamp_ns: int, _steady_ns: int) -> None:
         self.landed_state = m.landed_state
-        return True
 
-    def _text(self, m: Any, _stamp_ns: int, steady_ns: int) -> bool:
-        text = m.text if isinstance(m.text, str) else m.text.decode('utf-8', 'replace')
-        text = text.rstrip('\0')
-        if m.id:
-            if len(self._chunks) > 8:
-                self._chunks.clear()
-            whole = self._chunks.pop(m.id, '') + text
-            if len(text) >= CHUNK and len(whole) < 1024:
-                self._chunks[m.id] = whole
-                return True
-            text = whole
-        self.texts.append((steady_ns, text))
-        return True
+    def _health(self, m: Any, _stamp_ns: int, _steady_ns: int) -> None:
+        # -1 says that the autopilot does not measure it.
+        self._battery = m.battery_remaining / 100.0 if 0 <= m.battery_remaining <= 100 else None
+
+    def _estimate(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
+        self._estimator = (steady_ns, int(m.flags))
+
+    def _text(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
+        self.texts.take(m, steady_ns)
+
+
+def _size(m: Any) -> float:
+    return sqrt(m.q1 * m.q1 + m.q2 * m.q2 + m.q3 * m.q3 + m.q4 * m.q4)
+
+
+def _is_sane(kind: str, message: Any) -> bool:
+    if not all(isfinite(getattr(message, name)) for name in NUMBERS.get(kind, ())):
+        return False
+    return kind != 'ATTITUDE_QUATERNION' or 0.9 < _size(message) < 1.1
 
 
 _HANDLERS = {
@@ -227,5 +304,8 @@ _HANDLERS = {
     'DISTANCE_SENSOR': Assembler._distance,  # noqa: SLF001
     'HOME_POSITION': Assembler._home,  # noqa: SLF001
     'EXTENDED_SYS_STATE': Assembler._landed,  # noqa: SLF001
+    'SYS_STATUS': Assembler._health,  # noqa: SLF001
+    'EKF_STATUS_REPORT': Assembler._estimate,  # noqa: SLF001
+    'ESTIMATOR_STATUS': Assembler._estimate,  # noqa: SLF001
     'STATUSTEXT': Assembler._text,  # noqa: SLF001
 }

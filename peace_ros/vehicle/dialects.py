@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import atan2, cos, hypot, sin
 from typing import Any, Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.domain.errors import VehicleError
-from peace_ros.domain.motion import Setpoint
+from peace_ros.domain.geometry import rotation_matrix
+from peace_ros.domain.motion import Pose, Setpoint
 
 VELOCITY_HOLD_HEADING = 0x5C7
 """Type mask: use velocity and yaw rate (which is zero), ignore everything else.
@@ -19,7 +21,8 @@ The mask without yaw rate (0xDC7) would turn the nose to the direction of travel
 """
 CUSTOM_MODE = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
-ModeCommand = tuple[float, float, float]
+Vector = tuple[float, float, float]
+ModeCommand = Vector
 """The first three parameters of MAV_CMD_DO_SET_MODE."""
 
 
@@ -51,6 +54,26 @@ class Dialect(Protocol):
         """Name of the autopilot's own mode for holding position."""
         ...
 
+    @property
+    def land_mode(self) -> str:
+        """Name of the autopilot's own mode for landing where it is."""
+        ...
+
+    @property
+    def level_mode(self) -> str:
+        """Mode in which it keeps its height, level, without a position; empty: it has none."""
+        ...
+
+    @property
+    def estimator_message(self) -> int:
+        """Message id that tells what its position filter knows."""
+        ...
+
+    @property
+    def heartbeat_rate_hz(self) -> float:
+        """Rate of HEARTBEAT to ask for; 0: a new mode is told at once anyway."""
+        ...
+
     def mode_name(self, custom_mode: int) -> str:
         """Return the autopilot's own name of a mode."""
         ...
@@ -61,6 +84,10 @@ class Dialect(Protocol):
 
     def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
         """Return the set-point as a message to (system, component)."""
+        ...
+
+    def landing_target_message(self, site_ned_m: Vector, pose: Pose, stamp_us: int) -> Any:
+        """Return LANDING_TARGET for a point on the ground, local NED, in a frame it takes."""
         ...
 
 
@@ -82,6 +109,57 @@ def _velocity_message(setpoint: Setpoint, boot_ms: int, target: tuple[int, int])
         0.0,
         0.0,
         0.0,
+    )
+
+
+LEVEL_HOLDS_HEIGHT = 0.5
+"""Thrust that means "climb at zero" in ArduCopter's GUIDED_NOGPS."""
+ONLY_ATTITUDE = 0x07
+"""Type mask: ignore the body rates; level attitude, heading and thrust count."""
+
+
+def level_message(yaw_rad: float, boot_ms: int, target: tuple[int, int]) -> Any:
+    """Return SET_ATTITUDE_TARGET: level, heading as given, neither climbing nor descending."""
+    return mavlink.MAVLink_set_attitude_target_message(
+        boot_ms & 0xFFFFFFFF,
+        target[0],
+        target[1],
+        ONLY_ATTITUDE,
+        [cos(yaw_rad / 2.0), 0.0, 0.0, sin(yaw_rad / 2.0)],
+        0.0,
+        0.0,
+        0.0,
+        LEVEL_HOLDS_HEIGHT,
+    )
+
+
+def _from_body(site_ned_m: Vector, pose: Pose) -> Vector:
+    """Return the way from the vehicle to a point: forward, right, down."""
+    away = (
+        site_ned_m[0] - pose.north_m,
+        site_ned_m[1] - pose.east_m,
+        site_ned_m[2] - pose.down_m,
+    )
+    body = rotation_matrix(pose.quaternion_ned_frd).T @ away
+    return float(body[0]), float(body[1]), float(body[2])
+
+
+def _landing_target(frame: int, vector: Vector, body_m: Vector, stamp_us: int) -> Any:
+    distance_m = max(0.01, hypot(*body_m))
+    forward, right, down = body_m
+    return mavlink.MAVLink_landing_target_message(
+        stamp_us,
+        0,
+        frame,
+        atan2(right, down),
+        atan2(-forward, down),
+        distance_m,
+        0.0,
+        0.0,
+        *vector,
+        [1.0, 0.0, 0.0, 0.0],
+        mavlink.LANDING_TARGET_TYPE_VISION_OTHER,
+        1,
     )
 
 
@@ -128,6 +206,10 @@ class ArduPilot:
     autopilot: int = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     streams_before_control: bool = False
     control_mode: str = 'GUIDED'
+    land_mode: str = 'LAND'
+    level_mode: str = 'GUIDED_NOGPS'
+    estimator_message: int = 193
+    heartbeat_rate_hz: float = 0.0
     _names: dict[int, str] = field(
         default_factory=lambda: {number: name for name, number in ARDUCOPTER_MODES.items()}
     )
@@ -145,6 +227,11 @@ class ArduPilot:
     def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
         """Return SET_POSITION_TARGET_LOCAL_NED, frame LOCAL_NED, heading held."""
         return _velocity_message(setpoint, boot_ms, target)
+
+    def landing_target_message(self, site_ned_m: Vector, pose: Pose, stamp_us: int) -> Any:
+        """Return LANDING_TARGET in BODY_FRD, the frame of its precision landing."""
+        body_m = _from_body(site_ned_m, pose)
+        return _landing_target(mavlink.MAV_FRAME_BODY_FRD, body_m, body_m, stamp_us)
 
 
 PX4_MODES: dict[str, tuple[int, int]] = {
@@ -173,6 +260,10 @@ class Px4:
     streams_before_control: bool = True
     control_mode: str = 'OFFBOARD'
     hold_mode: str = 'AUTO.LOITER'
+    land_mode: str = 'AUTO.LAND'
+    level_mode: str = ''
+    estimator_message: int = 230
+    heartbeat_rate_hz: float = 5.0
     _names: dict[tuple[int, int], str] = field(
         default_factory=lambda: {numbers: name for name, numbers in PX4_MODES.items()}
     )
@@ -192,6 +283,11 @@ class Px4:
     def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
         """Return SET_POSITION_TARGET_LOCAL_NED, frame LOCAL_NED, heading held."""
         return _velocity_message(setpoint, boot_ms, target)
+
+    def landing_target_message(self, site_ned_m: Vector, pose: Pose, stamp_us: int) -> Any:
+        """Return LANDING_TARGET in LOCAL_NED, the only frame that it takes."""
+        body_m = _from_body(site_ned_m, pose)
+        return _landing_target(mavlink.MAV_FRAME_LOCAL_NED, site_ned_m, body_m, stamp_us)
 
 
 DIALECTS = ('auto', 'ardupilot', 'px4')

@@ -12,10 +12,10 @@ from typing import Protocol
 from peace_ros.domain.errors import VehicleError
 from peace_ros.domain.motion import Pose, Setpoint, Telemetry
 from peace_ros.vehicle.dialects import DIALECTS
+from peace_ros.vehicle.lasting import LastingTransport
 from peace_ros.vehicle.mavlink import MavlinkLink
 from peace_ros.vehicle.parameters import VehicleParameters
 from peace_ros.vehicle.result import RequestResult
-from peace_ros.vehicle.transport import open_transport
 
 
 class VehicleLink(Protocol):
@@ -64,7 +64,7 @@ def open_vehicle(
         url: ``udpin:HOST:PORT`` (listen), ``udpout:HOST:PORT`` (call), ``tcp:HOST:PORT``,
             ``serial:/dev/NAME:BAUD`` or ``/dev/NAME:BAUD``.
         dialect: ``auto``, ``ardupilot`` or ``px4``.
-        clock_ns: Node clock; poses are stamped with it at receipt.
+        clock_ns: Node clock; poses are stamped with it, as TIMESYNC maps the autopilot's.
         parameters: Rates, limits, source of altitude.
         timeout_s: Replaces ``parameters.connect_timeout_s``.
 
@@ -77,6 +77,6 @@ def open_vehicle(
     if timeout_s is not None:
         chosen = replace(chosen, connect_timeout_s=timeout_s)
     try:
-        return MavlinkLink(open_transport(url), dialect, chosen, clock_ns)
+        return MavlinkLink(LastingTransport(url), dialect, chosen, clock_ns)
     except VehicleError as error:
         raise VehicleError(f'vehicle at {url}: {error}') from error

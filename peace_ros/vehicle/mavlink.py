@@ -15,40 +15,44 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from peace_ros.domain.errors import VehicleError
 from peace_ros.domain.motion import Pose, Setpoint, Telemetry
 from peace_ros.vehicle.assembler import Assembler
-from peace_ros.vehicle.dialects import Dialect, choose_dialect
+from peace_ros.vehicle.clock import TimeMap
+from peace_ros.vehicle.control import Control
+from peace_ros.vehicle.dialects import Dialect, choose_dialect, level_message
+from peace_ros.vehicle.housekeeping import Housekeeping
+from peace_ros.vehicle.lasting import LastingTransport
 from peace_ros.vehicle.parameters import VehicleParameters
+from peace_ros.vehicle.peer import Peer
+from peace_ros.vehicle.requests import Requests
 from peace_ros.vehicle.result import Answer, RequestResult
+from peace_ros.vehicle.signing import Signer
 from peace_ros.vehicle.streams import StreamKeeper
-from peace_ros.vehicle.transport import Source, Transport
+from peace_ros.vehicle.transport import Source
+from peace_ros.vehicle.wire import Wire
 
 READ_S = 0.02
-HEARTBEAT_NS = 1_000_000_000
-RESEND_S = 0.7
-REASON_S = 0.4
-"""How long the STATUSTEXT with the reason may lag behind its COMMAND_ACK."""
-NEW_ADDRESS_NS = 5_000_000_000
-"""Silence of the autopilot after which the same system is believed from another address."""
 ZERO_STREAM_NS = 50_000_000
 PRE_STREAM_S = 0.6
-ZERO = Setpoint(stamp_ns=0)
+THRUST_AS_THRUST = 8
+"""Bit of ArduCopter's GUID_OPTIONS with which thrust no longer means climb rate."""
 
 
 class MavlinkLink:
-    """Talks to the autopilot that spoke first, and to no other.
+    """Talks to one autopilot, and believes no other.
 
     Args:
         transport: An open line; the link closes it.
         dialect: ``auto``, ``ardupilot`` or ``px4``.
         parameters: Rates and limits.
-        clock_ns: Node clock; poses are stamped with it at receipt.
+        clock_ns: Node clock; poses are stamped with it.
 
     Raises:
+        ConfigurationError: The signing key cannot be read.
         VehicleError: No autopilot was heard in time, or one that the dialect does not fit.
     """
 
     def __init__(
         self,
-        transport: Transport,
+        transport: LastingTransport,
         dialect: str,
         parameters: VehicleParameters,
         clock_ns: Callable[[], int],
@@ -57,33 +61,28 @@ class MavlinkLink:
         self._wanted_dialect = dialect
         self._parameters = parameters
         self._clock_ns = clock_ns
-        self._codec = mavlink.MAVLink(
-            None, parameters.system_id, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER
-        )
-        self._stream_parser = self._new_parser()
+        key_file = parameters.signing_key_file
+        signer = Signer.from_file(key_file) if key_file else None
+        self._wire = Wire(parameters.system_id, signer, datagrams=transport.datagrams)
         self._changed = threading.Condition()
-        self._write_lock = threading.Lock()
-        self._request_lock = threading.Lock()
         self._stop = threading.Event()
         self._opened_ns = time.monotonic_ns()
+        self._peer = Peer(parameters.vehicle_id, self._opened_ns)
+        ours = (parameters.system_id, int(mavlink.MAV_COMP_ID_ONBOARD_COMPUTER))
+        self._requests = Requests(self._changed, parameters.request_limit_s, ours)
+        self._clock = TimeMap()
         self._dialect: Dialect | None = None
         self._assembler: Assembler | None = None
+        self._house = Housekeeping(self._clock, clock_ns)
         self._error: VehicleError | None = None
-        self._target = (0, 0)
-        self._source: Source = None
-        self._heard_ns = 0
-        self._acks: dict[int, int] = {}
-        self._leaving_to = ''
-        self._leaving_until_ns = 0
-        self._taken_over = False
+        self._openings = 1
+        self._control = Control()
         self._zero_until_ns = 0
-        self._zero_sent_ns = 0
-        self._heartbeat_sent_ns = 0
-        self._streams = StreamKeeper(parameters)
+        self._stream_due_ns = 0
+        self._holding_level = False
         self._bytes_heard = 0
-        self.ignored = 0
-        """Messages of others than the believed autopilot."""
         self._thread = threading.Thread(target=self._run, name='mavlink_link', daemon=True)
+        self._sinking = SinkWatch()
         self._thread.start()
         self._await_autopilot()
 
@@ -97,7 +96,36 @@ class MavlinkLink:
     @property
     def taken_over(self) -> bool:
         """A person or a failsafe has left the mode that obeys us, since we were last in it."""
-        return self._taken_over
+        return self._control.taken_over
+
+    @property
+    def problem(self) -> str:
+        """Why the vehicle cannot be reached now, empty when it can."""
+        if self._transport.problem:
+            return self._transport.problem
+        limit_s = self._parameters.heartbeat_limit_s
+        with self._changed:
+            age_s = self._heard().heartbeat_age_s(time.monotonic_ns())
+        if age_s <= limit_s:
+            return ''
+        return f'no HEARTBEAT of the autopilot for {age_s:.0f} s, limit {limit_s} s: is it there?'
+
+    @property
+    def position_problem(self) -> str:
+        """Why the autopilot will not obey velocities now, empty when nothing speaks against it."""
+        with self._changed:
+            found = self._heard().position_problem(time.monotonic_ns())
+            return found or self._sinking.problem
+
+    @property
+    def ignored(self) -> int:
+        """Messages of others than the believed autopilot."""
+        return self._peer.ignored
+
+    @property
+    def unsigned(self) -> int:
+        """Messages that were refused for their signature."""
+        return self._wire.refused
 
     @property
     def rejected(self) -> int:
@@ -106,15 +134,35 @@ class MavlinkLink:
             return self._heard().rejected
 
     @property
+    def late(self) -> int:
+        """Messages that came twice or out of order, and were dropped."""
+        with self._changed:
+            return self._heard().late
+
+    @property
+    def clock(self) -> TimeMap:
+        """The autopilot's clock in terms of ours, for looking at."""
+        return self._clock
+
+    @property
     def landed_state(self) -> int:
         """MAV_LANDED_STATE: 0 unknown, 1 ground, 2 air, 3 take-off, 4 landing."""
         with self._changed:
             return self._heard().landed_state
 
+    @property
+    def home_msl_m(self) -> float | None:
+        """Altitude of home above sea level, None until it is known."""
+        with self._changed:
+            return self._heard().home_msl_m
+
     def telemetry(self) -> Telemetry:
         """Return what the autopilot last said."""
         with self._changed:
-            return self._heard().telemetry(time.monotonic_ns())
+            now_ns = time.monotonic_ns()
+            told = self._heard().telemetry(now_ns)
+            self._sinking.take(None if told.pose is None else told.pose.altitude_agl_m, now_ns)
+            return replace(told, pose=None) if self._sinking.problem else told
 
     def take_poses(self) -> list[Pose]:
         """Return the poses since the last call, oldest first (at most 256)."""
@@ -126,7 +174,11 @@ class MavlinkLink:
     def status_texts(self) -> list[str]:
         """Return the newest STATUSTEXTs, oldest first (at most 50)."""
         with self._changed:
-            return [text for _, text in self._heard().texts]
+            return [text for _, text in self._heard().texts.entries]
+
+    def report_health(self, mav_state: int) -> None:
+        """Say MAV_STATE in our HEARTBEAT from now on; a change is told at once."""
+        self._house.set_health(mav_state)
 
     def send_velocity(self, setpoint: Setpoint) -> None:
         """Send one set-point; it is not clamped, that is the guard's work.
@@ -140,7 +192,13 @@ class MavlinkLink:
                 f'velocity set-point {v} m/s: all components must be finite; nothing was sent'
             )
         self._zero_until_ns = 0
+        self._sinking.tell(setpoint.v_down_m_s)
         self._send_setpoint(setpoint)
+
+    def send_landing_target(self, site_ned_m: tuple[float, float, float], pose: Pose) -> None:
+        """Send LANDING_TARGET for a point on the ground, local NED."""
+        stamp_us = pose.stamp_ns // 1000 & 0xFFFF_FFFF_FFFF_FFFF
+        self._send(self.dialect.landing_target_message(site_ned_m, pose, stamp_us))
 
     def request_control(self, *, by_person: bool = False) -> RequestResult:
         """Ask for the mode that obeys set-points; blocks at most ``request_limit_s`` and a bit.
@@ -148,12 +206,17 @@ class MavlinkLink:
         Once a person or a failsafe has taken over, this refuses by itself: pass ``by_person``
         only when a person asks for it anew.
         """
-        if self._taken_over and not by_person:
+        if self.taken_over and not by_person:
             return RequestResult(
                 Answer.REFUSED,
                 f'{self.telemetry().mode} was chosen after we had control: a person must engage',
             )
-        self._taken_over = False
+        with self._changed:
+            self._sinking.forget()
+        if problem := self.position_problem:
+            return RequestResult(Answer.REFUSED, problem)
+        self._control.ask_anew()
+        self._holding_level = False
         if self.dialect.streams_before_control:
             limit_ns = int((self._parameters.request_limit_s + PRE_STREAM_S + 1.0) * 1e9)
             self._zero_until_ns = time.monotonic_ns() + limit_ns
@@ -167,26 +230,50 @@ class MavlinkLink:
         """Ask for the autopilot's own hold mode; blocks at most ``request_limit_s`` and a bit."""
         return self.set_mode(self.dialect.hold_mode)
 
+    def request_land(self) -> RequestResult:
+        """Ask for the autopilot's own landing, only while it obeys us."""
+        if self.taken_over or not self.telemetry().in_control:
+            return RequestResult(Answer.REFUSED, 'somebody else has control')
+        return self.set_mode(self.dialect.land_mode)
+
+    def request_level_hold(self) -> RequestResult:
+        """Ask to be held level, at this height and heading, without any position.
+
+        Only for a person who asks: the vehicle drifts with the wind. It lasts until the mode is
+        changed or control is asked for; the set-points are sent by the link itself.
+        """
+        mode = self.dialect.level_mode
+        if not mode:
+            return RequestResult(
+                Answer.REFUSED, f'{self.dialect.name} cannot hold its height without a position'
+            )
+        options = self._requests.parameter(self._send, self._peer.target, 'GUID_OPTIONS')
+        if options is None or int(options) & THRUST_AS_THRUST:
+            return RequestResult(
+                Answer.REFUSED,
+                f'GUID_OPTIONS is {options}: thrust must mean climb rate (bit 3 clear)',
+            )
+        result = self.set_mode(mode)
+        self._holding_level = bool(result)
+        return result
+
     def set_mode(self, mode: str) -> RequestResult:
         """Ask for a mode by the autopilot's own name and wait until HEARTBEAT shows it."""
         flags, main, sub = self.dialect.mode_command(mode)
-        limit_ns = int(self._parameters.request_limit_s * 1e9)
-        deadline_ns = time.monotonic_ns() + limit_ns
+        deadline_ns = time.monotonic_ns() + int(self._parameters.request_limit_s * 1e9)
         if mode != self.dialect.control_mode:
-            self._leaving_to = mode
-            self._leaving_until_ns = deadline_ns + 1_000_000_000
+            self._control.leave_to(mode, deadline_ns)
         result = self.command(mavlink.MAV_CMD_DO_SET_MODE, flags, main, sub)
         if not result:
-            self._leaving_until_ns = 0
+            self._control.stay()
             return result
         with self._changed:
-            while self._heard().mode != mode:
-                left_s = (deadline_ns - time.monotonic_ns()) / 1e9
-                if left_s <= 0.0 or not self._changed.wait(left_s):
-                    return RequestResult(
-                        Answer.NO_ANSWER, f'{mode} was accepted, but HEARTBEAT does not show it', 0
-                    )
-        self._leaving_until_ns = 0
+            left_s = (deadline_ns - time.monotonic_ns()) / 1e9
+            if not self._changed.wait_for(lambda: self._heard().mode == mode, max(0.0, left_s)):
+                return RequestResult(
+                    Answer.NO_ANSWER, f'{mode} was accepted, but HEARTBEAT does not show it', 0
+                )
+        self._control.stay()
         return result
 
     def command(self, command: int, *params: float) -> RequestResult:
@@ -196,55 +283,18 @@ class MavlinkLink:
             command: MAV_CMD.
             params: Up to seven parameters; missing ones are 0.
         """
-        values = (*params, *(0.0,) * (7 - len(params)))
-        started_ns = time.monotonic_ns()
-        deadline = time.monotonic() + self._parameters.request_limit_s
-        with self._request_lock:
-            with self._changed:
-                self._acks.pop(command, None)
-            code: int | None = None
-            attempt = 0
-            while code is None and (left_s := deadline - time.monotonic()) > 0.0:
-                self._send(
-                    mavlink.MAVLink_command_long_message(
-                        *self._target, command, min(attempt, 255), *values
-                    )
-                )
-                attempt += 1
-                code = self._await_ack(command, min(RESEND_S, left_s))
-        if code == mavlink.MAV_RESULT_ACCEPTED:
-            return RequestResult(Answer.ACCEPTED, code=code)
-        if code is None:
-            limit = self._parameters.request_limit_s
-            return RequestResult(Answer.NO_ANSWER, f'no COMMAND_ACK within {limit} s')
-        return RequestResult(Answer.REFUSED, self._reason(started_ns, code), code)
+        with self._changed:
+            texts = self._heard().texts
+        return self._requests.command(self._send, self._peer.target, texts, command, params)
 
     def close(self) -> None:
         """Stop the thread and release the line; may be called twice."""
         self._stop.set()
-        self._thread.join(timeout=2.0)
+        self._requests.end()
+        if self._thread is not threading.current_thread():
+            self._thread.join(timeout=2.0)
         self._transport.close()
-
-    def _await_ack(self, command: int, timeout_s: float) -> int | None:
-        deadline = time.monotonic() + timeout_s
-        with self._changed:
-            while command not in self._acks:
-                left_s = deadline - time.monotonic()
-                if left_s <= 0.0 or self._stop.is_set():
-                    return None
-                self._changed.wait(left_s)
-            return self._acks.pop(command)
-
-    def _reason(self, since_ns: int, code: int) -> str:
-        deadline = time.monotonic() + REASON_S
-        with self._changed:
-            while True:
-                told = [text for at_ns, text in self._heard().texts if at_ns >= since_ns]
-                left_s = deadline - time.monotonic()
-                if told or left_s <= 0.0:
-                    break
-                self._changed.wait(left_s)
-        return told[-1] if told else f'MAV_RESULT {code} without a reason'
+        self._wire.keep(time.monotonic(), at_once=True)
 
     def _heard(self) -> Assembler:
         if self._assembler is None:
@@ -261,64 +311,55 @@ class MavlinkLink:
                 return
             error = self._error
         self.close()
+        refused = f', {self._wire.refused} not rightly signed' if self._wire.refused else ''
         raise error or VehicleError(
-            f'no HEARTBEAT of an autopilot within {limit_s} s ({self._bytes_heard} bytes heard): '
-            'check address, port, baud rate and that MAVLink 2 is sent to this line'
+            f'no HEARTBEAT of an autopilot within {limit_s} s ({self._bytes_heard} bytes heard'
+            f'{refused}): check address, port, baud rate and that MAVLink 2 is sent to this line'
+            f'{self._peer.heard_instead()}'
         )
 
     def _run(self) -> None:
-        try:
-            while not self._stop.is_set():
-                for data, source in self._transport.read(READ_S):
-                    self._bytes_heard += len(data)
-                    for message in self._decode(data):
-                        self._take(message, source)
+        while not self._stop.is_set() and self._error is None:
+            for data, source in self._transport.read(READ_S):
+                self._bytes_heard += len(data)
+                for message in self._wire.decode(data):
+                    self._take(message, source)
+            if self._transport.openings != self._openings:
+                self._begin_anew()
+            try:
                 self._keep_house(time.monotonic_ns())
-        except VehicleError as error:
-            with self._changed:
-                self._error = error
-                self._changed.notify_all()
+            except VehicleError:
+                continue  # the transport knows, says why, and opens the line again
 
-    def _new_parser(self) -> Any:
-        parser = mavlink.MAVLink(None)
-        parser.robust_parsing = True
-        return parser
-
-    def _decode(self, data: bytes) -> list[Any]:
-        # Datagrams stand alone: rubbish in one must not swallow the beginning of the next.
-        parser = self._new_parser() if self._transport.datagrams else self._stream_parser
-        try:
-            messages = parser.parse_buffer(bytearray(data)) or []
-        except mavlink.MAVError:
-            return []
-        return [m for m in messages if m.get_msgId() >= 0]
+    def _begin_anew(self) -> None:
+        self._openings = self._transport.openings
+        self._wire.restart()
+        if self._house.streams is not None:
+            self._house.streams.forget()
 
     def _take(self, message: Any, source: Source) -> None:
         now_ns = time.monotonic_ns()
-        who = (message.get_srcSystem(), message.get_srcComponent())
-        kind = message.get_type()
         with self._changed:
-            if self._assembler is None and not self._believe(message, who, source):
+            if self._assembler is None and not self._meet(message, source, now_ns):
                 return
-            moved = source != self._source
-            if who != self._target or (moved and now_ns - self._heard_ns < NEW_ADDRESS_NS):
-                self.ignored += 1
+            if not self._peer.is_ours(message, source, now_ns):
                 return
-            self._source, self._heard_ns = source, now_ns
             assembler = self._heard()
-            if kind == 'COMMAND_ACK':
-                self._take_ack(message)
+            self._requests.take(message)
+            if message.get_type() == 'TIMESYNC':
+                self._house.take_time(message)
             was_control = assembler.mode == self.dialect.control_mode
             assembler.take(message, self._clock_ns(), now_ns)
-            if kind == 'HEARTBEAT' and was_control:
-                self._watch_takeover(assembler.mode, now_ns)
+            if message.get_type() == 'HEARTBEAT':
+                self._holding_level &= assembler.mode == self.dialect.level_mode
+                if was_control and assembler.mode != self.dialect.control_mode:
+                    self._zero_until_ns = 0
+                    self._control.left_for(assembler.mode, now_ns)
             self._changed.notify_all()
 
-    def _believe(self, message: Any, who: tuple[int, int], source: Source) -> bool:
-        """Choose the autopilot: the first HEARTBEAT that is one's."""
-        if message.get_type() != 'HEARTBEAT' or message.type == mavlink.MAV_TYPE_GCS:
-            return False
-        if message.autopilot == mavlink.MAV_AUTOPILOT_INVALID:
+    def _meet(self, message: Any, source: Source, now_ns: int) -> bool:
+        """Choose the autopilot at its first HEARTBEAT; tell whether this was it."""
+        if not self._peer.is_candidate(message, source, now_ns):
             return False
         try:
             self._dialect = choose_dialect(
@@ -328,59 +369,40 @@ class MavlinkLink:
             self._error = error
             self._changed.notify_all()
             return False
-        self._assembler = Assembler(self._dialect, self._parameters)
-        self._target, self._source = who, source
+        self._peer.choose(message, source, now_ns)
+        self._house.streams = StreamKeeper(self._parameters, self._dialect)
+        self._assembler = Assembler(self._dialect, self._parameters, self._clock)
         return True
 
-    def _take_ack(self, m: Any) -> None:
-        if m.result == mavlink.MAV_RESULT_IN_PROGRESS:
-            return
-        ours = (self._parameters.system_id, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
-        # Zero says "to anybody"; older firmware leaves the field out.
-        if m.target_system in {0, ours[0]} and m.target_component in {0, ours[1]}:
-            self._acks[m.command] = m.result
-
-    def _watch_takeover(self, mode: str, now_ns: int) -> None:
-        if mode == self.dialect.control_mode:
-            return
-        self._zero_until_ns = 0
-        if now_ns > self._leaving_until_ns or mode != self._leaving_to:
-            self._taken_over = True
-        self._leaving_until_ns = 0
-
     def _keep_house(self, now_ns: int) -> None:
-        if now_ns - self._heartbeat_sent_ns >= HEARTBEAT_NS:
-            self._heartbeat_sent_ns = now_ns
-            self._send(
-                mavlink.MAVLink_heartbeat_message(
-                    mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-                    mavlink.MAV_AUTOPILOT_INVALID,
-                    0,
-                    0,
-                    mavlink.MAV_STATE_ACTIVE,
-                    3,
-                )
-            )
+        heartbeat = self._house.heartbeat(now_ns)
+        if heartbeat is not None:
+            self._wire.keep(now_ns / 1e9)
+            self._send(heartbeat)
         if self._assembler is None:
             return
-        for command, params in self._streams.due(self._assembler, now_ns):
-            self._send(
-                mavlink.MAVLink_command_long_message(
-                    *self._target, command, 0, *params, 0.0, 0.0, 0.0, 0.0, 0.0
-                )
-            )
-        if now_ns < self._zero_until_ns and now_ns - self._zero_sent_ns >= ZERO_STREAM_NS:
-            self._zero_sent_ns = now_ns
-            self._send_setpoint(ZERO)
+        with self._changed:
+            requests = self._house.requests(now_ns, self._assembler, self._peer.target)
+        for request in requests:
+            self._send(request)
+        flowing = self._holding_level or now_ns < self._zero_until_ns
+        if not flowing or now_ns < self._stream_due_ns:
+            return
+        self._stream_due_ns = now_ns + ZERO_STREAM_NS
+        if self._holding_level:
+            yaw_rad = self._assembler.yaw_rad
+            self._send(level_message(yaw_rad, self._since_opening_ms(), self._peer.target))
+        else:
+            self._send_setpoint(Setpoint(stamp_ns=0))
+
+    def _since_opening_ms(self) -> int:
+        return (time.monotonic_ns() - self._opened_ns) // 1_000_000
 
     def _send_setpoint(self, setpoint: Setpoint) -> None:
-        boot_ms = (time.monotonic_ns() - self._opened_ns) // 1_000_000
-        self._send(self.dialect.velocity_message(setpoint, boot_ms, self._target))
+        now_ms, target = self._since_opening_ms(), self._peer.target
+        self._send(self.dialect.velocity_message(setpoint, now_ms, target))
 
     def _send(self, message: Any) -> None:
         if self._error is not None:
             raise self._error
-        with self._write_lock:
-            data = message.pack(self._codec)
-            self._codec.seq = (self._codec.seq + 1) % 256
-            self._transport.write(data, self._source)
+        self._transport.write(self._wire.pack(message), self._peer.source)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a person with a ground station would do: ready, arm, take off, land.
 
-For demonstrations and tests, against any ArduCopter. Nothing here arms unless the caller says so:
+Made for demonstrations and tests. Nothing here arms unless the caller says so:
 by :meth:`Pilot.arm`, or by ``arm=True`` of :meth:`Pilot.take_off`.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from math import nan
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -63,7 +64,7 @@ class Pilot:
         self._say('armed')
 
     def take_off(self, altitude_m: float, timeout_s: float = 180.0, *, arm: bool = False) -> None:
-        """GUIDED, climb; returns when the autopilot says that the take-off is over.
+        """GUIDED (PX4: AUTO.TAKEOFF), climb; returns when the take-off is over.
 
         No velocity set-point may be sent meanwhile: it would abort the take-off.
 
@@ -77,7 +78,9 @@ class Pilot:
                 or disarmed on the way.
         """
         deadline = time.monotonic() + timeout_s
-        self.set_mode('GUIDED', timeout_s)
+        goal_m = self._prepare_take_off(altitude_m, timeout_s)
+        # PX4 reads zero as latitude and longitude; ArduCopter looks at the altitude only.
+        unused = nan if self._link.dialect.name == 'px4' else 0.0
         accepted = RequestResult(Answer.NO_ANSWER)
         while not accepted:
             # It disarms by itself 10 s after arming, so arming belongs into the loop.
@@ -88,7 +91,7 @@ class Pilot:
                     'take-off: the vehicle is not armed; call arm() or pass arm=True'
                 )
             accepted = self._link.command(
-                mavlink.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, altitude_m
+                mavlink.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, unused, unused, unused, goal_m
             )
             if not accepted:
                 self._check_time(deadline, f'take-off: {accepted.reason}')
@@ -103,7 +106,7 @@ class Pilot:
     def land(self, timeout_s: float = 120.0) -> None:
         """LAND, and wait until the motors are off."""
         deadline = time.monotonic() + timeout_s
-        self.set_mode('LAND', timeout_s)
+        self.set_mode(self._link.dialect.land_mode, timeout_s)
         self.wait_disarmed(deadline - time.monotonic())
 
     def wait_disarmed(self, timeout_s: float = 120.0) -> None:
@@ -120,6 +123,14 @@ class Pilot:
             return pose is not None and abs(pose.altitude_agl_m - altitude_m) <= tolerance_m
 
         self._wait(there, f'{altitude_m} m above ground', timeout_s)
+
+    def _prepare_take_off(self, altitude_m: float, timeout_s: float) -> float:
+        """Make ready; return the altitude to ask for, whose reference differs."""
+        if self._link.dialect.name != 'px4':
+            self.set_mode(self._link.dialect.control_mode, timeout_s)
+            return altitude_m
+        self._wait(lambda: self._link.home_msl_m is not None, 'the altitude of home', timeout_s)
+        return altitude_m + (self._link.home_msl_m or 0.0)
 
     def _has_climbed(self, altitude_m: float) -> bool:
         told = self._link.telemetry()

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The timed sender with the dead-man: no set-point outlives its age.
 
-Fresh set-point -> it is sent. Older than ``limit_s`` -> zero velocity. Older than ``limit_s`` plus
-``handover_s`` -> the autopilot is asked, once, for its own hold mode. Not in control -> silence.
+Fresh set-point -> it is sent. Before it is ``limit_s`` old -> zero velocity. Older than
+``limit_s`` plus ``handover_s`` -> the autopilot is asked, once, for its own hold mode. Not in
+control -> silence.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from peace_ros.domain.errors import VehicleError
 from peace_ros.domain.motion import Setpoint
 from peace_ros.vehicle.link import VehicleLink
 from peace_ros.vehicle.parameters import SenderParameters
+
+SLACK_S = 0.01
+"""How late a tick may be without the dead-man being late."""
 
 
 class SenderState(Enum):
@@ -69,9 +73,11 @@ class SetpointSender:
     ) -> None:
         p = parameters or SenderParameters()
         self._link = link
-        self._limit_ns = int((p.limit_s if limit_s is None else limit_s) * 1e9)
-        self._handover_ns = self._limit_ns + int(p.handover_s * 1e9)
+        limit_s = p.limit_s if limit_s is None else limit_s
         self._period_s = 1.0 / p.rate_hz
+        # The tick after the last good one must bring the zero, or it would come too late.
+        self._limit_ns = int((limit_s - self._period_s - SLACK_S) * 1e9)
+        self._handover_ns = int((limit_s + p.handover_s) * 1e9)
         self._steady_ns = steady_ns
         self._lock = threading.Lock()
         self._stop = threading.Event()

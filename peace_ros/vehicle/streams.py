@@ -7,12 +7,15 @@ from __future__ import annotations
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.vehicle.assembler import Assembler
+from peace_ros.vehicle.dialects import Dialect
 from peace_ros.vehicle.parameters import VehicleParameters
 
 SILENT_NS = 1_500_000_000
 """A stream that is silent for so long is asked for again."""
 ASK_AGAIN_NS = 1_000_000_000
 HOME_AGAIN_NS = 3_000_000_000
+HEALTH_HZ = 1.0
+ESTIMATOR_HZ = 4.0
 
 Request = tuple[int, tuple[float, float]]
 """MAV_CMD and its first two parameters."""
@@ -21,12 +24,16 @@ Request = tuple[int, tuple[float, float]]
 class StreamKeeper:
     """Knows which messages are wanted and when each was last asked for."""
 
-    def __init__(self, parameters: VehicleParameters) -> None:
+    def __init__(self, parameters: VehicleParameters, dialect: Dialect) -> None:
         self._rates_hz: dict[int, float] = {
             mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: parameters.pose_rate_hz,
             mavlink.MAVLINK_MSG_ID_ATTITUDE: parameters.pose_rate_hz,
             mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: parameters.state_rate_hz,
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: HEALTH_HZ,
+            dialect.estimator_message: ESTIMATOR_HZ,
         }
+        if dialect.heartbeat_rate_hz > 0.0:
+            self._rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
         if parameters.altitude_source == 'rangefinder':
             self._rates_hz[mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR] = parameters.pose_rate_hz
         self._asked_ns: dict[int, int] = {}
@@ -36,10 +43,11 @@ class StreamKeeper:
         """Return the requests to send now."""
         if assembler.reboots != self._reboots:
             self._reboots = assembler.reboots
-            self._asked_ns.clear()
+            self.forget()
         requests: list[Request] = []
         for message_id, rate_hz in self._rates_hz.items():
-            silent = now_ns - assembler.arrived_ns.get(message_id, 0) > SILENT_NS
+            limit_ns = max(SILENT_NS, round(3e9 / rate_hz))
+            silent = now_ns - assembler.arrived_ns.get(message_id, 0) > limit_ns
             if message_id not in self._asked_ns or silent:
                 request = (
                     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
@@ -51,6 +59,10 @@ class StreamKeeper:
             request = (mavlink.MAV_CMD_REQUEST_MESSAGE, (float(home), 0.0))
             self._ask(requests, home, request, HOME_AGAIN_NS, now_ns)
         return requests
+
+    def forget(self) -> None:
+        """Ask for everything again: the autopilot or the line begins anew."""
+        self._asked_ns.clear()
 
     def _ask(
         self, requests: list[Request], key: int, request: Request, again_ns: int, now_ns: int

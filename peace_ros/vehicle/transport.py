@@ -71,6 +71,8 @@ class _Udp:
                 break
             except ConnectionError:
                 continue  # nobody listens there yet: the autopilot may still be starting
+            except OSError:
+                break  # the network is away for a moment
             chunks.append((data, source))
         return chunks
 
@@ -90,12 +92,12 @@ class _Udp:
 class _Tcp:
     datagrams = False
 
-    def __init__(self, host: str, port: int) -> None:
+    def __init__(self, host: str, port: int, connect_s: float) -> None:
         try:
-            self._socket = socket.create_connection((host, port), timeout=CONNECT_S)
+            self._socket = socket.create_connection((host, port), timeout=connect_s)
         except OSError as error:
             raise VehicleError(
-                f'tcp:{host}:{port}: {error.strerror or error} within {CONNECT_S} s; '
+                f'tcp:{host}:{port}: {error.strerror or error} within {connect_s} s; '
                 'start the autopilot or its router first'
             ) from error
         self._socket.settimeout(WRITE_S)
@@ -103,12 +105,12 @@ class _Tcp:
         self._name = f'tcp:{host}:{port}'
 
     def read(self, timeout_s: float) -> list[Chunk]:
-        if not select.select([self._socket], [], [], timeout_s)[0]:
-            return []
         try:
+            if not select.select([self._socket], [], [], timeout_s)[0]:
+                return []
             data = self._socket.recv(65535)
-        except OSError as error:
-            raise VehicleError(f'{self._name}: {error.strerror}') from error
+        except (OSError, ValueError) as error:
+            raise VehicleError(f'{self._name}: {error}') from error
         if not data:
             raise VehicleError(f'{self._name}: the other side closed the connection')
         return [(data, None)]
@@ -160,8 +162,12 @@ class _Serial:
         self._line.close()
 
 
-def open_transport(url: str) -> Transport:
+def open_transport(url: str, connect_s: float | None = None) -> Transport:
     """Open the line that a URL names.
+
+    Args:
+        url: See ``URL_HELP``.
+        connect_s: Longest wait for a TCP server; None: 5 s.
 
     Raises:
         VehicleError: The URL is not understood, the port is taken, the device is missing.
@@ -177,5 +183,5 @@ def open_transport(url: str) -> Transport:
     if scheme not in {'udpin', 'udpout', 'tcp'} or not host or not 0 <= port <= 65535:
         raise VehicleError(f'connection {url!r} is not understood: {URL_HELP}')
     if scheme == 'tcp':
-        return _Tcp(host, port)
+        return _Tcp(host, port, CONNECT_S if connect_s is None else connect_s)
     return _Udp(host, port, listen=scheme == 'udpin')

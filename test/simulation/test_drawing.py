@@ -16,10 +16,12 @@ from peace_ros.simulation.drawing import (
     apply_condition,
     draw_scene,
 )
+from peace_ros.simulation.drawing.canvas import Canvas
 from peace_ros.simulation.drawing.light import Sun
 from peace_ros.simulation.drawing.palette import Palette
-from peace_ros.simulation.drawing.plan import Plan, Warp
+from peace_ros.simulation.drawing.plan import Plan, Thing, Warp
 from peace_ros.simulation.drawing.scene import Look, render
+from peace_ros.simulation.drawing.sprites import stamp_thing
 from peace_ros.simulation.drawing.window import Window
 
 PLAIN = Look((1.0, 1.0, 1.0), 1.0, 1.0, 0.0, 0.0, 0.0, 0.4)
@@ -244,3 +246,12 @@ def test_scenes_out_of_range_are_refused(arguments, said):
 def test_unknown_condition_is_refused():
     with pytest.raises(WorldError, match='hail'):
         apply_condition(np.zeros((8, 8, 3), np.uint8), 'hail', np.random.default_rng(1))
+
+
+def test_a_thing_outside_of_the_picture_leaves_no_label_at_its_edge():
+    window = Window(left_m=0.0, top_m=0.0, width_px=40, height_px=40, gsd_m=0.05)
+    canvas = Canvas(window, seed=1)
+    # Its circle touches the picture, none of its opaque pixels do.
+    thing = Thing('person', 2.3, 1.0, pi / 2, 0.45, 0.3, (200.0, 30.0, 30.0), Label.PERSON)
+    stamp_thing(canvas, thing)
+    assert not (canvas.labels == Label.PERSON).any()

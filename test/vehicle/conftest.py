@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
-from peace_ros.vehicle import Pilot, VehicleParameters, open_vehicle
+from peace_ros.vehicle import VehicleParameters, open_vehicle
 
 
 def wait_until(predicate, limit_s=5.0):
@@ -85,11 +85,31 @@ def free_port():
         return probe.getsockname()[1]
 
 
+def in_the_air(altitude_m, speed, **parameters):
+    """Return a simulation that hovers in the mode for set-points; it has not been started yet."""
+    sim = AutopilotSim(AutopilotParameters(port=0, speed=speed, **parameters))
+    sim.step(43.0)
+    if sim.parameters.autopilot == 'px4':
+        sim.flight.take_off(altitude_m + sim.parameters.home_altitude_msl_m)
+        sim.flight.arm()
+    else:
+        sim.pilot_mode('GUIDED')
+        sim.flight.arm()
+        sim.flight.take_off(altitude_m)
+    sim.step(10.0 + altitude_m / 2.0)
+    return sim
+
+
+@pytest.fixture
+def hovering():
+    return in_the_air
+
+
 @pytest.fixture
 def flying():
-    """Simulation at 40 times real time, 20 m above home in GUIDED, with its link."""
-    with AutopilotSim(AutopilotParameters(port=0, speed=40.0)) as sim:
+    """Simulation at 10 times real time, 20 m above home in GUIDED, with its link."""
+    with in_the_air(20.0, 10.0) as sim:
         link = open_vehicle(sim.url, parameters=VehicleParameters(pose_limit_s=0.4))
-        Pilot(link, retry_s=0.1).take_off(20.0, timeout_s=60.0, arm=True)
+        assert wait_until(lambda: link.telemetry().pose is not None, 5.0)
         yield sim, link
         link.close()

@@ -8,6 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.vehicle.assembler import Assembler
+from peace_ros.vehicle.clock import TimeMap
 from peace_ros.vehicle.dialects import ArduPilot
 from peace_ros.vehicle.parameters import VehicleParameters
 
@@ -58,6 +59,7 @@ def test_numbers_that_are_none_are_counted_and_not_believed(assembler, bad):
     ):
         assembler.take(message, 0, 0)
     assert assembler.rejected == 5
+    assert assembler.late == 0
     assert assembler.telemetry(0).pose.north_m == 1.0
 
 
@@ -71,10 +73,9 @@ def test_an_old_position_is_no_position(assembler):
     assert told.received_ns == int(1.5 * SECOND)
 
 
-def test_control_is_the_mode_and_needs_a_living_heartbeat(assembler):
+def test_control_is_the_mode_that_was_said_last(assembler):
     assembler.take(heartbeat(4), 0, 0)
     assert assembler.telemetry(0).in_control
-    assert not assembler.telemetry(4 * SECOND).in_control
     assembler.take(heartbeat(5, base=1), 0, 4 * SECOND)
     told = assembler.telemetry(4 * SECOND)
     assert (told.in_control, told.mode, told.armed) == (False, 'LOITER', False)
@@ -127,4 +128,98 @@ def test_long_texts_are_put_together(assembler):
     for chunk, text in enumerate((b'x' * 50, b'yz')):
         assembler.take(mavlink.MAVLink_statustext_message(4, text, 7, chunk), 0, 0)
     assembler.take(mavlink.MAVLink_statustext_message(4, b'short'), 0, 0)
-    assert [text for _, text in assembler.texts] == ['x' * 50 + 'yz', 'short']
+    assert [text for _, text in assembler.texts.entries] == ['x' * 50 + 'yz', 'short']
+
+
+def test_nothing_is_believed_of_an_autopilot_whose_heartbeat_is_silent(assembler):
+    assembler.take(heartbeat(4), 0, 0)
+    for second in (1, 3, 4):
+        assembler.take(position(1000 * second), 0, second * SECOND)
+        assembler.take(attitude(1000 * second), 0, second * SECOND)
+        known = assembler.telemetry(second * SECOND).pose is not None
+        assert known == (second < 4), 'its mode may have changed since'
+    assert assembler.telemetry(4 * SECOND).in_control, 'silence is no takeover'
+
+
+def test_what_comes_twice_or_late_is_dropped(assembler):
+    assembler.take(position(2000, x=5.0), 0, 0)
+    assembler.take(attitude(2000), 0, 0)
+    assembler.take(position(1960, x=4.0), 0, 0)
+    assembler.take(attitude(2000, roll=0.3), 0, 0)
+    assert assembler.late == 2
+    assert len(assembler.poses) == 1
+    assert assembler.telemetry(0).pose.north_m == 5.0
+
+
+def jump(assembler, count=150, mode=4, begin_ms=1100):
+    """Report a place 20 m away for a while; return when it is believed."""
+    assembler.take(heartbeat(mode), 0, 0)
+    for i in range(count):
+        boot_ms = begin_ms + 33 * i
+        assembler.take(position(boot_ms, x=21.0), 0, i * SECOND // 30)
+        assembler.take(attitude(boot_ms), 0, i * SECOND // 30)
+        if assembler.telemetry(i * SECOND // 30).pose is not None:
+            return i / 30
+    return None
+
+
+def test_a_jump_is_not_believed_while_we_fly(assembler):
+    assembler.take(heartbeat(4), 0, 0)
+    assembler.take(position(1000), 0, 0)
+    assembler.take(attitude(1000), 0, 0)
+    assert assembler.poses
+    assembler.poses.clear()
+    assert jump(assembler) is None
+    assert 'jumped by 20.0 m' in assembler.position_problem(0)
+    assert not assembler.poses, 'the map must not see it either'
+    assembler.take(heartbeat(4), 0, 5 * SECOND)
+    assembler.take(position(9000), 0, 5 * SECOND)
+    assembler.take(attitude(9000), 0, 5 * SECOND)
+    assert assembler.telemetry(5 * SECOND).pose is not None, 'back where it was'
+
+
+def test_a_jump_is_believed_after_two_seconds_when_a_person_flies(assembler):
+    assembler.take(position(1000), 0, 0)
+    assembler.take(attitude(1000), 0, 0)
+    assert jump(assembler, mode=5) == pytest.approx(2.0, abs=0.2)
+
+
+@pytest.mark.parametrize(('flags', 'problem'), [(0x33F, False), (0x2D, False), (0xA5, True)])
+def test_the_filter_says_whether_there_is_a_position(assembler, flags, problem):
+    assembler.take(position(), 0, 0)
+    report = mavlink.MAVLink_ekf_status_report_message(flags, 0, 0, 0, 0, 0)
+    assembler.take(report, 0, 0)
+    assembler.take(attitude(), 0, 0)
+    assert bool(assembler.position_problem(0)) == problem
+    assert (assembler.telemetry(0).pose is None) == problem
+
+
+@pytest.mark.parametrize(('said', 'remaining'), [(-1, None), (0, 0.0), (37, 0.37), (100, 1.0)])
+def test_battery_is_a_part_of_one_or_unknown(assembler, said, remaining):
+    message = mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 12000, -1, said, 0, 0, 0, 0, 0, 0)
+    assembler.take(message, 0, 0)
+    assert assembler.telemetry(0).battery_remaining == remaining
+
+
+def test_a_home_that_moves_in_flight_does_not_move_the_ground(assembler):
+    def home(down_m):
+        return mavlink.MAVLink_home_position_message(0, 0, 0, 0, 0, down_m, [1, 0, 0, 0], 0, 0, 0)
+
+    assembler.take(home(0.0), 0, 0)
+    assembler.take(heartbeat(4), 0, 0)
+    assembler.take(mavlink.MAVLink_extended_sys_state_message(0, 2), 0, 0)
+    assembler.take(home(-15.0), 0, 0)
+    assembler.take(position(), 0, 0)
+    assembler.take(attitude(), 0, 0)
+    assert assembler.telemetry(0).pose.altitude_agl_m == pytest.approx(30.0)
+    assert assembler.rejected == 1
+
+
+def test_poses_get_the_moment_at_which_they_were_true():
+    clock = TimeMap()
+    assembler = Assembler(ArduPilot(), VehicleParameters(), clock)
+    for i in range(5):
+        clock.add(i * SECOND, i * SECOND + 500_000_000, i * SECOND + 4_000_000)
+    assembler.take(position(6000), 0, 0)
+    assembler.take(attitude(6000), int(5.54 * SECOND), 0)
+    assert assembler.poses[0].stamp_ns == pytest.approx(5.502 * SECOND, abs=1_000_000)

@@ -11,10 +11,14 @@ from math import radians
 from types import TracebackType
 from typing import final
 
+from peace_ros.domain.errors import VehicleError
 from peace_ros.domain.motion import Pose
+from peace_ros.simulation.autopilot.disturbance import Disturbance
+from peace_ros.simulation.autopilot.fault_port import FaultServer
 from peace_ros.simulation.autopilot.flight import Flight
-from peace_ros.simulation.autopilot.modes import Mode, Result
+from peace_ros.simulation.autopilot.modes import Result
 from peace_ros.simulation.autopilot.parameters import AutopilotParameters
+from peace_ros.simulation.autopilot.personality import Kind, Personality
 from peace_ros.simulation.autopilot.physics import Physics
 from peace_ros.simulation.autopilot.server import MavlinkServer
 
@@ -26,6 +30,7 @@ CATCH_UP = 1.5
 """How much faster than ``speed`` the simulated clock runs while it is behind."""
 MAX_LAG_S = 2.0
 """Wall time that is made up for; beyond it the simulated clock has run slow for good."""
+_FLYING_M = 5.0
 
 
 @final
@@ -44,12 +49,24 @@ class AutopilotSim:
 
     def __init__(self, parameters: AutopilotParameters | None = None) -> None:
         self.parameters = parameters or AutopilotParameters()
-        self._lock = threading.RLock()
+        self.lock = threading.RLock()
+        """Held while the simulation steps, and while a fault is put in."""
+        self.disturbance = Disturbance()
+        self.lowest_agl_m = float('inf')
+        """Since it first was above 5 m; infinite before."""
+        self._personality = Personality(Kind(self.parameters.autopilot))
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._clock_offset_s = 0.0
         self._remainder_s = 0.0
-        self._server = MavlinkServer(self.parameters)
+        self._server = MavlinkServer(self.parameters, self._personality, self.disturbance)
+        self._faults: FaultServer | None = None
+        if self.parameters.fault_port > 0:
+            try:
+                self._faults = FaultServer(self.parameters.fault_port)
+            except VehicleError:
+                self._server.close()
+                raise
         self._flight = self._power_on()
 
     def __enter__(self) -> AutopilotSim:
@@ -72,8 +89,24 @@ class AutopilotSim:
     @property
     def time_ns(self) -> int:
         """Simulated clock; it goes on through a reboot of the autopilot."""
-        with self._lock:
+        with self.lock:
             return round((self._clock_offset_s + self._flight.time_s) * 1e9)
+
+    @property
+    def tcp_url(self) -> str:
+        """Where a companion connects to by TCP; empty when there is no such port."""
+        port = self.parameters.tcp_port
+        return f'tcp:{self.parameters.host}:{port}' if port else ''
+
+    @property
+    def refused_signatures(self) -> int:
+        """Messages that were not signed with its key."""
+        return self._server.refused_signatures
+
+    @property
+    def mode_name(self) -> str:
+        """The autopilot's own name of its mode."""
+        return self._personality.mode_name(self._flight.mode)
 
     @property
     def flight(self) -> Flight:
@@ -82,7 +115,7 @@ class AutopilotSim:
 
     def truth(self) -> Pose:
         """Return where the vehicle really is, relative to home, at the simulated clock."""
-        with self._lock:
+        with self.lock:
             p = self._flight.physics
             return Pose(
                 stamp_ns=self.time_ns,
@@ -96,13 +129,16 @@ class AutopilotSim:
     def step(self, dt_s: float) -> None:
         """Serve the peers and advance the simulated clock by dt_s in steps of the physics."""
         tick = 1.0 / self.parameters.physics_rate_hz
-        with self._lock:
+        with self.lock:
+            if self._faults is not None:
+                self._faults.poll(self)
             self._server.receive(self._flight)
             self._remainder_s += dt_s
             while self._remainder_s >= tick - 1e-9:
                 self._remainder_s -= tick
                 self._flight.step(tick)
                 self._server.send_due(self._flight)
+                self._note_altitude()
 
     def run(
         self,
@@ -141,43 +177,62 @@ class AutopilotSim:
         if self._thread is not None:
             self._thread.join(timeout=5.0)
         self._server.close()
+        if self._faults is not None:
+            self._faults.close()
 
     def pilot_mode(self, mode: str) -> bool:
         """Move the pilot's mode switch; tell whether the autopilot took the mode."""
-        with self._lock:
-            return self._flight.set_mode(Mode[mode]) is Result.ACCEPTED
+        with self.lock:
+            wanted = self._personality.mode_of_name(mode)
+            return self._flight.set_mode(wanted) is Result.ACCEPTED
 
     def pilot_yaw_stick(self, yaw_rate_rad_s: float) -> None:
         """Hold the yaw stick: it turns the vehicle in GUIDED too."""
-        with self._lock:
+        with self.lock:
             self._flight.turn_stick(yaw_rate_rad_s)
 
     def lose_gps(self, *, stale: bool = False) -> None:
         """Take GPS away; LOCAL_POSITION_NED stops, or goes on with old numbers when ``stale``."""
-        with self._lock:
+        with self.lock:
             self._flight.lose_gps(stale=stale)
 
     def restore_gps(self) -> None:
         """Give GPS back."""
-        with self._lock:
+        with self.lock:
             self._flight.restore_gps()
 
     def lose_radio(self) -> None:
         """Take the pilot's radio away: RTL."""
-        with self._lock:
+        with self.lock:
             self._flight.lose_radio()
 
     def silence(self, *, silent: bool = True) -> None:
         """Cut the MAVLink line in both directions, or mend it."""
-        with self._lock:
-            self._server.silent = silent
+        with self.lock:
+            self.disturbance.silent_until_s = float('inf') if silent else 0.0
 
-    def reboot(self) -> None:
-        """Restart the autopilot where the vehicle is: its boot time begins at zero again."""
-        with self._lock:
+    def reboot(self, *, keep_armed: bool = False) -> None:
+        """Restart the autopilot where the vehicle is: its boot time begins at zero again.
+
+        Args:
+            keep_armed: Come up armed when it was, as after a watchdog reset in flight.
+        """
+        with self.lock:
+            armed = keep_armed and self._flight.armed
+            battery = self._flight.battery_remaining
             self._clock_offset_s += self._flight.time_s
-            self._flight = Flight(self._flight.physics)
+            self._flight = self._boot(self._flight.physics)
+            self._flight.battery_remaining = battery
+            self._flight.revive(armed=armed)
             self._server.restart()
+
+    def _boot(self, physics: Physics) -> Flight:
+        return Flight(physics, self._personality, self.parameters.home_altitude_msl_m)
+
+    def _note_altitude(self) -> None:
+        altitude_m = -self._flight.physics.down_m
+        if altitude_m > _FLYING_M or self.lowest_agl_m < float('inf'):
+            self.lowest_agl_m = min(self.lowest_agl_m, altitude_m)
 
     def _power_on(self) -> Flight:
         p = self.parameters
@@ -189,4 +244,4 @@ class AutopilotSim:
             gust_m_s=p.gust_m_s,
             seed=p.seed,
         )
-        return Flight(physics)
+        return self._boot(physics)

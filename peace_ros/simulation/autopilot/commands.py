@@ -26,7 +26,7 @@ def run_command(flight: Flight, command: int, p: Params) -> Result:
     handler = _COMMANDS.get(command)
     if handler is None:
         return Result.UNSUPPORTED
-    if not all(isfinite(each) for each in (p[0], p[1])):
+    if not all(isfinite(each) for each in p[:3]):
         return Result.DENIED
     return handler(flight, p)
 
@@ -34,7 +34,7 @@ def run_command(flight: Flight, command: int, p: Params) -> Result:
 def _set_mode(flight: Flight, p: Params) -> Result:
     if not int(p[0]) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
         return Result.DENIED
-    return flight.set_mode(int(p[1]))
+    return flight.set_mode(flight.personality.mode_of_command(p[1], p[2]))
 
 
 def _arm(flight: Flight, p: Params) -> Result:
@@ -96,7 +96,11 @@ def _attitude_target(flight: Flight, m: Any) -> None:
 
 def _old_set_mode(flight: Flight, m: Any) -> None:
     if m.base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-        flight.set_mode(m.custom_mode)
+        packed = m.custom_mode
+        main, sub = (
+            (packed >> 16 & 0xFF, packed >> 24) if flight.personality.is_px4 else (packed, 0)
+        )
+        flight.set_mode(flight.personality.mode_of_command(main, sub))
 
 
 _MESSAGES: dict[int, Callable[[Flight, Any], None]] = {

@@ -9,10 +9,16 @@ the ground lies in ``texts`` until the server takes it.
 from __future__ import annotations
 
 from collections import deque
+from math import isfinite
 
 from peace_ros.simulation.autopilot.estimator import Estimator
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import RULES, LandedState, Mode, Result, Severity
+from peace_ros.simulation.autopilot.personality import (
+    OFFBOARD_LOSS_S,
+    SETPOINT_FRAMES_PX4,
+    Personality,
+)
 from peace_ros.simulation.autopilot.physics import Physics
 from peace_ros.simulation.autopilot.steering import Steering
 
@@ -23,19 +29,34 @@ SPOOL_UP_S = 2.5
 PREARM_TEXT_EVERY_S = 30.0
 FORCE_MAGIC = 21196
 """param2 of the arm command that skips the checks."""
+LOW_BATTERY = 0.2
 
 
 class Flight:
     """One power-on of the autopilot."""
 
-    def __init__(self, physics: Physics) -> None:
+    def __init__(
+        self,
+        physics: Physics,
+        personality: Personality | None = None,
+        ground_msl_m: float = 0.0,
+    ) -> None:
         self.physics = physics
+        self.personality = personality or Personality()
+        self._ground_msl_m = ground_msl_m
         self.estimator = Estimator()
         self.time_s = 0.0
         self.mode = Mode.STABILIZE
         self.armed = False
         self.landed = True
-        self.texts: deque[tuple[Severity, str]] = deque(maxlen=100)
+        self.texts: deque[tuple[int, str]] = deque(maxlen=100)
+        self.battery_remaining = 1.0
+        self.setpoints = 0
+        """Velocity set-points that have come, whoever sent them."""
+        self.setpoints_refused = 0
+        """Those of them that the mode or the frame left without effect."""
+        self._setpoint_s: float | None = None
+        self._take_off_m = 0.0
         self.mode_changes = 0
         self.home_changes = 0
         self.home_m = (physics.north_m, physics.east_m, 0.0)
@@ -46,7 +67,7 @@ class Flight:
         self._armed_idle_s = 0.0
         self._next_prearm_text_s = 5.0
         self._was_ready = False
-        self._say(Severity.INFO, 'ArduCopter V4.7.0 (peace_ros simulation)')
+        self.say(Severity.INFO, self.personality.banner)
 
     @property
     def has_position(self) -> bool:
@@ -75,6 +96,11 @@ class Flight:
         return LandedState.IN_AIR
 
     @property
+    def setpoint_age_s(self) -> float | None:
+        """Since the newest understood set-point, None before the first."""
+        return None if self._setpoint_s is None else self.time_s - self._setpoint_s
+
+    @property
     def _truth(self) -> tuple[float, float, float]:
         return self.physics.north_m, self.physics.east_m, self.physics.down_m
 
@@ -84,10 +110,12 @@ class Flight:
         failsafe = self.estimator.step(self.time_s)
         self._tell_readiness()
         if failsafe and self.armed and not self.landed and RULES[self.mode].needs_position:
-            self._say(Severity.CRITICAL, 'EKF Failsafe: changed to LAND Mode')
+            self.say(Severity.CRITICAL, 'EKF Failsafe: changed to LAND Mode')
             self._enter(Mode.LAND)
         if self._steering.wants_land(self.mode):
             self._enter(Mode.LAND)
+        self._watch_offboard()
+        self._take_off_by_mode()
         command = self._steering.command(
             dt_s, self.mode, armed=self.armed, landed=self.landed, has_position=self.has_position
         )
@@ -99,14 +127,18 @@ class Flight:
         try:
             mode = Mode(number)
         except ValueError:
-            self._say(Severity.WARNING, f'Mode change failed: no such mode {number}')
+            self.say(Severity.WARNING, f'Mode change failed: no such mode {number}')
             return Result.FAILED
         if mode is self.mode:
             return Result.ACCEPTED
+        name = self.personality.mode_name(mode)
+        if self.personality.is_px4 and mode is Mode.GUIDED and not self._stream_flows():
+            self.say(Severity.CRITICAL, f'Switching to {name} is currently not available')
+            return self.personality.refused
         # Disarmed, any mode may be chosen: the arming checks look at the position then.
         if self.armed and RULES[mode].needs_position and not self.has_position:
-            self._say(Severity.WARNING, f'Mode change to {mode.name} failed: requires position')
-            return Result.FAILED
+            self.say(Severity.WARNING, f'Mode change to {name} failed: requires position')
+            return self.personality.refused
         self._enter(mode)
         return Result.ACCEPTED
 
@@ -115,28 +147,31 @@ class Flight:
         if self.armed:
             return Result.ACCEPTED
         if not RULES[self.mode].armable:
-            self._say(Severity.CRITICAL, f'Arm: {self.mode.name} mode not armable')
+            self.say(Severity.CRITICAL, f'Arm: {self.mode.name} mode not armable')
             return Result.FAILED
         problem = self.prearm_problem()
         if problem and not force:
-            self._say(Severity.CRITICAL, f'Arm: {problem}')
+            self.say(Severity.CRITICAL, f'Arm: {problem}')
             return Result.FAILED
         self.armed = True
         self._armed_idle_s = 0.0
         self._set_home()
-        self._say(Severity.INFO, 'Arming motors')
+        self.say(Severity.INFO, 'Arming motors')
         return Result.ACCEPTED
 
     def disarm(self, *, force: bool = False) -> Result:
         """Stop the motors; in the air only when forced."""
         if self.armed and not self.landed and not force:
-            self._say(Severity.CRITICAL, 'Disarm: vehicle is flying')
+            self.say(Severity.CRITICAL, 'Disarm: vehicle is flying')
             return Result.FAILED
         self._stop_motors()
         return Result.ACCEPTED
 
     def take_off(self, altitude_m: float) -> Result:
         """Climb to an altitude above home: only in GUIDED, armed and on the ground."""
+        if self.personality.is_px4:
+            self._take_off_m = altitude_m - self._ground_msl_m  # its altitude is above sea level
+            return self.set_mode(Mode.TAKEOFF) if self._take_off_m > 0.0 else Result.DENIED
         if self.mode is not Mode.GUIDED or not self.armed or not self.landed or altitude_m <= 0.0:
             return Result.FAILED
         self._steering.take_off(altitude_m, SPOOL_UP_S)
@@ -145,8 +180,20 @@ class Flight:
 
     def take_velocity(self, target: PositionTarget) -> None:
         """Take a set-point, which only GUIDED obeys; it ends a take-off."""
+        self.setpoints += 1
+        if self.personality.is_px4 and target.frame not in SETPOINT_FRAMES_PX4:
+            self.say(
+                Severity.CRITICAL,
+                f'SET_POSITION_TARGET_LOCAL_NED coordinate frame {target.frame} unsupported',
+            )
+            self.setpoints_refused += 1
+            return
+        if all(isfinite(each) for each in target.velocity_m_s):
+            self._setpoint_s = self.time_s
         if self.mode is Mode.GUIDED:
             self._steering.take_velocity(target)
+        else:
+            self.setpoints_refused += 1
 
     def take_attitude(
         self, lean_rad: tuple[float, float], yaw_rad: float | None, thrust: float
@@ -175,7 +222,7 @@ class Flight:
 
     def lose_radio(self) -> None:
         """Radio failsafe: RTL, or LAND where that needs a position that is missing."""
-        self._say(Severity.CRITICAL, 'Radio Failsafe')
+        self.say(Severity.CRITICAL, 'Radio Failsafe')
         if self.armed and not self.landed and self.set_mode(Mode.RTL) is not Result.ACCEPTED:
             self._enter(Mode.LAND)
 
@@ -189,6 +236,42 @@ class Flight:
             return 'AHRS: waiting for home'
         return ''
 
+    def revive(self, *, armed: bool) -> None:
+        """Come up in the air after a reboot in flight: STABILIZE, armed or falling."""
+        self.armed = armed
+        self.landed = self.physics.on_ground
+
+    def say(self, severity: int, text: str) -> None:
+        """Tell a STATUSTEXT."""
+        self.texts.append((int(severity), text))
+
+    def set_battery(self, remaining: float) -> None:
+        """Set the charge, 0 to 1."""
+        if remaining < LOW_BATTERY <= self.battery_remaining:
+            self.say(Severity.CRITICAL, f'Battery 1 is low: {remaining:.0%} remaining')
+        self.battery_remaining = remaining
+
+    def _stream_flows(self) -> bool:
+        age_s = self.setpoint_age_s
+        return age_s is not None and age_s <= OFFBOARD_LOSS_S
+
+    def _watch_offboard(self) -> None:
+        """PX4 gives the vehicle to the sticks when the set-points stop."""
+        if not (self.personality.is_px4 and self.armed and self.mode is Mode.GUIDED):
+            return
+        if not self._stream_flows():
+            self.say(Severity.CRITICAL, 'Failsafe activated: offboard control signal lost')
+            self._enter(Mode.LOITER if self.has_position else Mode.LAND)
+
+    def _take_off_by_mode(self) -> None:
+        if self.mode is not Mode.TAKEOFF or not self.armed or self._steering.taking_off:
+            return
+        if self.landed:
+            self._steering.take_off(self._take_off_m, SPOOL_UP_S)
+            self._armed_idle_s = 0.0
+        else:
+            self._enter(Mode.BRAKE)
+
     def _enter(self, mode: Mode) -> None:
         self.mode = mode
         self.mode_changes += 1
@@ -199,7 +282,7 @@ class Flight:
             return
         self.armed = False
         self._steering.enter(self.mode, has_position=self.has_position)
-        self._say(Severity.INFO, 'Disarming motors')
+        self.say(Severity.INFO, 'Disarming motors')
 
     def _set_home(self) -> None:
         if self.has_position:
@@ -210,7 +293,7 @@ class Flight:
     def _tell_readiness(self) -> None:
         ready = self.has_position
         if ready and not self._was_ready:
-            self._say(Severity.INFO, 'EKF3 IMU0 is using GPS')
+            self.say(Severity.INFO, 'EKF3 IMU0 is using GPS')
             if self.home_changes == 0:
                 self._set_home()
         self._was_ready = ready
@@ -219,7 +302,7 @@ class Flight:
         self._next_prearm_text_s += PREARM_TEXT_EVERY_S
         problem = self.prearm_problem()
         if problem and not self.armed:
-            self._say(Severity.CRITICAL, f'PreArm: {problem}')
+            self.say(Severity.CRITICAL, f'PreArm: {problem}')
 
     def _feel_ground(self, dt_s: float) -> None:
         if not self.physics.on_ground:
@@ -235,6 +318,3 @@ class Flight:
         self._armed_idle_s += dt_s
         if self._steering.landing(self.mode) or self._armed_idle_s >= AUTO_DISARM_S:
             self._stop_motors()
-
-    def _say(self, severity: Severity, text: str) -> None:
-        self.texts.append((severity, text))

@@ -20,6 +20,8 @@ class Mode(IntEnum):
     POSHOLD = 16
     BRAKE = 17
     GUIDED_NOGPS = 20
+    TAKEOFF = 1000
+    """Of PX4 only, where a take-off is a mode of its own; no number of ArduCopter."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ RULES: dict[Mode, ModeRules] = {
     Mode.POSHOLD: ModeRules(needs_position=True, armable=True),
     Mode.BRAKE: ModeRules(needs_position=True, armable=False),
     Mode.GUIDED_NOGPS: ModeRules(needs_position=False, armable=True),
+    Mode.TAKEOFF: ModeRules(needs_position=True, armable=True),
 }
 
 
@@ -47,6 +50,8 @@ class Result(IntEnum):
     """MAV_RESULT of a command."""
 
     ACCEPTED = 0
+    REJECTED = 1
+    """Temporarily: PX4 says it where ArduPilot says FAILED."""
     DENIED = 2
     UNSUPPORTED = 3
     FAILED = 4

@@ -13,9 +13,26 @@ from peace_ros.domain.parameters import check, parameter
 class AutopilotParameters:
     """What a user may choose of the simulated vehicle and its server."""
 
+    autopilot: str = parameter(
+        'ardupilot', 'Which autopilot is played.', choices=('ardupilot', 'px4')
+    )
     host: str = parameter('127.0.0.1', 'Address on which the MAVLink server listens.')
     port: int = parameter(
         14550, 'UDP port of the MAVLink server; 0 lets the system choose.', low=0, high=65535
+    )
+    tcp_port: int = parameter(
+        0, 'TCP port of the MAVLink server besides; 0 opens none.', low=0, high=65535
+    )
+    fault_port: int = parameter(
+        0,
+        'UDP port, on the loopback address, on which faults can be injected; 0 opens none.',
+        low=0,
+        high=65535,
+    )
+    signing_key_file: str = parameter(
+        '',
+        'File with the key of MAVLink 2 signing (32 bytes, or a passphrase); messages that are '
+        'not signed with it are refused. Empty: no signing.',
     )
     system_id: int = parameter(1, 'MAVLink system id of the vehicle.', low=1, high=254)
     start_north_m: float = parameter(

@@ -143,6 +143,12 @@ class Physics:
         self._lateral = _Axes(LATERAL, 2)
         self._vertical = _Axes(VERTICAL, 1)
 
+    def set_wind(self, wind_to_m_s: tuple[float, float], gust_m_s: float) -> None:
+        """Change the wind from now on."""
+        self._wind, self._gust_m_s = wind_to_m_s, gust_m_s
+        if gust_m_s == 0.0:
+            self._gust = self._felt_gust = (0.0, 0.0)
+
     @property
     def velocity_ned_m_s(self) -> tuple[float, float, float]:
         """North, east, down."""

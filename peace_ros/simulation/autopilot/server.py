@@ -1,32 +1,30 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""MAVLink 2 over one UDP port: any number of peers, each with its own message intervals."""
+"""MAVLink 2 over UDP and TCP: any number of peers, each with its own message intervals."""
 
 from __future__ import annotations
 
-import select
-import socket
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.domain.errors import VehicleError
 from peace_ros.simulation.autopilot.commands import Params, run_command, run_message
+from peace_ros.simulation.autopilot.disturbance import BadLine, Disturbance
 from peace_ros.simulation.autopilot.flight import Flight
-from peace_ros.simulation.autopilot.modes import Result
+from peace_ros.simulation.autopilot.lines import Address, Lines
+from peace_ros.simulation.autopilot.modes import Mode, Result, Severity
 from peace_ros.simulation.autopilot.parameters import AutopilotParameters
+from peace_ros.simulation.autopilot.personality import Personality
+from peace_ros.simulation.autopilot.signing import Signing
 from peace_ros.simulation.autopilot.streams import Streams
 
 COMPONENT_ID = mavlink.MAV_COMP_ID_AUTOPILOT1
 HEARTBEAT_S = 1.0
 TIMESYNC_S = 10.0
 MAX_PEERS = 32
-MAX_DATAGRAMS = 256
-"""Datagrams taken in one turn, so that a flood cannot stop the physics."""
 TEXT_BYTES = 50
-Address = tuple[str, int]
 
 
 @dataclass
@@ -34,7 +32,10 @@ class Peer:
     """Somebody who has spoken to the server."""
 
     codec: Any
+    parser: Any
     address: Address
+    inward: BadLine
+    outward: BadLine
     interval_s: dict[int, float] = field(default_factory=dict)
     due_s: dict[int, float] = field(default_factory=dict)
     turn: int = 0
@@ -44,9 +45,17 @@ class Peer:
 class MavlinkServer:
     """Single-threaded: call :meth:`receive` and :meth:`send_due` from the loop that steps."""
 
-    def __init__(self, parameters: AutopilotParameters) -> None:
+    def __init__(
+        self,
+        parameters: AutopilotParameters,
+        personality: Personality | None = None,
+        disturbance: Disturbance | None = None,
+    ) -> None:
         self._parameters = parameters
-        self._streams = Streams(parameters)
+        self._personality = personality or Personality()
+        self._disturbance = disturbance or Disturbance()
+        self._streams = Streams(parameters, self._personality, self._disturbance)
+        self._signing = Signing(parameters.signing_key_file)
         self._peers: dict[Address, Peer] = {}
         self._values: dict[str, float] = {
             'GUID_TIMEOUT': 3.0,
@@ -59,30 +68,26 @@ class MavlinkServer:
             'FS_EKF_ACTION': 1.0,
         }
         self._turn = 0
+        self._text_id = 0
         self._seen = (0, 0)
         self._heartbeat_due_s = 0.0
         self._timesync_due_s = TIMESYNC_S
-        self.silent = False
         self.rejected_bytes = 0
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self._socket.bind((parameters.host, parameters.port))
-        except OSError as error:
-            self._socket.close()
-            raise VehicleError(
-                f'simulated autopilot on UDP {parameters.host}:{parameters.port}: {error.strerror};'
-                ' end the process that holds the port or choose another'
-            ) from error
-        self._socket.setblocking(False)
+        self._lines = Lines(parameters.host, parameters.port, parameters.tcp_port)
 
     @property
     def port(self) -> int:
         """UDP port that it listens on."""
-        return int(self._socket.getsockname()[1])
+        return self._lines.port
+
+    @property
+    def refused_signatures(self) -> int:
+        """Messages that were not signed with the key, when there is one."""
+        return self._signing.refused
 
     def close(self) -> None:
-        """Release the port."""
-        self._socket.close()
+        """Release the ports."""
+        self._lines.close()
 
     def restart(self) -> None:
         """Forget intervals and schedules, as a reboot does; addresses stay known."""
@@ -94,26 +99,25 @@ class MavlinkServer:
 
     def wait(self, seconds: float) -> None:
         """Sleep until a datagram arrives, at most so long."""
-        select.select([self._socket], [], [], max(0.0, seconds))
+        self._lines.wait(seconds)
 
     def receive(self, flight: Flight) -> None:
         """Take what has arrived; what is not MAVLink is counted and forgotten."""
-        for _ in range(MAX_DATAGRAMS):
-            try:
-                data, address = self._socket.recvfrom(65535)
-            except BlockingIOError:
-                return
-            except ConnectionError:
-                continue  # a peer that went away answers with an ICMP error
-            if self.silent:
+        for address, data, whole in self._lines.hear():
+            if self._disturbance.silent:
                 continue
-            for message in self._decode(data):
-                self._handle(flight, self._peer(address), message)
+            known = self._peers.get(address)
+            for arrived in [data] if known is None else known.inward.carry(data):
+                for message in self._decode(address, arrived, whole=whole):
+                    self._handle(flight, self._peer(address), message)
 
     def send_due(self, flight: Flight) -> None:
         """Send what the clock and the flight's news ask for."""
+        self._signing.keep_time()
         news = (flight.mode_changes, flight.home_changes)
-        if flight.time_s >= self._heartbeat_due_s or news[0] != self._seen[0]:
+        # ArduPilot tells a new mode at once, PX4 with the next regular HEARTBEAT.
+        mode_is_news = news[0] != self._seen[0] and not self._personality.is_px4
+        if flight.time_s >= self._heartbeat_due_s or mode_is_news:
             self._heartbeat_due_s = flight.time_s + HEARTBEAT_S
             self._tell_all(self._streams.build(mavlink.MAVLINK_MSG_ID_HEARTBEAT, flight))
         if news[1] != self._seen[1]:
@@ -121,12 +125,11 @@ class MavlinkServer:
         self._seen = news
         if flight.time_s >= self._timesync_due_s:
             self._timesync_due_s = flight.time_s + TIMESYNC_S
-            self._tell_all(mavlink.MAVLink_timesync_message(0, round(flight.time_s * 1e9)))
+            self._tell_all(mavlink.MAVLink_timesync_message(0, self._clock_ns(flight)))
         while self._peers and flight.texts:
             severity, text = flight.texts.popleft()
-            raw = text.encode('ascii', 'replace')[:TEXT_BYTES]
-            self._tell_all(mavlink.MAVLink_statustext_message(int(severity), raw))
-        for peer in self._peers.values():
+            self._tell_text(severity, text.encode('ascii', 'replace'))
+        for peer in list(self._peers.values()):
             self._send_streams(flight, peer)
 
     def _send_streams(self, flight: Flight, peer: Peer) -> None:
@@ -138,17 +141,16 @@ class MavlinkServer:
             peer.due_s[message_id] = (flight.time_s if late else due) + interval
             self._tell(peer, self._streams.build(message_id, flight))
 
-    def _decode(self, data: bytes) -> list[Any]:
+    def _decode(self, address: Address, data: bytes, *, whole: bool) -> list[Any]:
         # A parser for each datagram: a broken one must not swallow the beginning of the next.
-        codec = mavlink.MAVLink(None)
-        codec.robust_parsing = True
+        parser = self._signing.codec() if whole else self._peer(address).parser
         try:
-            messages = codec.parse_buffer(bytearray(data)) or []
+            messages = self._signing.parse(parser, data)
         except mavlink.MAVError:
             self.rejected_bytes += len(data)
             return []
         good = [m for m in messages if m.get_msgId() >= 0]
-        if len(good) != len(messages) or not good:
+        if len(good) != len(messages) or (whole and not good):
             self.rejected_bytes += len(data)
         return good
 
@@ -157,9 +159,15 @@ class MavlinkServer:
         if peer is None:
             if len(self._peers) >= MAX_PEERS:
                 silent = min(self._peers.values(), key=lambda each: each.turn)
-                del self._peers[silent.address]
-            codec = mavlink.MAVLink(None, self._parameters.system_id, COMPONENT_ID)
-            peer = self._peers[address] = Peer(codec, address)
+                self._forget(silent.address)
+            codec = self._signing.codec(self._parameters.system_id, COMPONENT_ID)
+            peer = self._peers[address] = Peer(
+                codec,
+                self._signing.codec(),
+                address,
+                BadLine(self._disturbance, 2 * self._turn),
+                BadLine(self._disturbance, 2 * self._turn + 1),
+            )
         self._turn += 1
         peer.turn = self._turn
         return peer
@@ -173,7 +181,7 @@ class MavlinkServer:
             self._command(flight, peer, message)
         elif kind == 'TIMESYNC':
             if message.tc1 == 0:
-                now = max(1, round(flight.time_s * 1e9))  # zero would be a question, not an answer
+                now = max(1, self._clock_ns(flight))  # zero would be a question, not an answer
                 self._tell(peer, mavlink.MAVLink_timesync_message(now, message.ts1))
         elif kind.startswith('PARAM_'):
             self._parameter(peer, message)
@@ -186,7 +194,11 @@ class MavlinkServer:
         else:
             p = (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7)
         wanted: int | None = None
-        if m.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
+        if self._refuses(flight, m.command, p):
+            if self._disturbance.refuse_silently:
+                return
+            result = self._personality.refused
+        elif m.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
             result = self._set_interval(flight, peer, p)
         elif m.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
             known = isfinite(p[0]) and self._streams.knows(int(p[0]))
@@ -203,6 +215,25 @@ class MavlinkServer:
         )
         if wanted is not None:
             self._tell(peer, self._streams.build(wanted, flight))
+
+    def _refuses(self, flight: Flight, command: int, p: Params) -> bool:
+        """Whether a fault refuses the mode that a command asks for."""
+        refused = self._disturbance.refused_modes
+        if not refused or command != mavlink.MAV_CMD_DO_SET_MODE:
+            return False
+        number = self._personality.mode_of_command(p[1], p[2])
+        names = [self._personality.mode_name(mode) for mode in Mode if mode == number]
+        if not refused.intersection(names):
+            return False
+        flight.say(Severity.WARNING, f'Mode change to {names[0]} failed: not now')
+        return True
+
+    def _clock_ns(self, flight: Flight) -> int:
+        return round((flight.time_s + self._disturbance.clock_step_s) * 1e9)
+
+    def _forget(self, address: Address) -> None:
+        del self._peers[address]
+        self._lines.hang_up(address)
 
     def _set_interval(self, flight: Flight, peer: Peer, p: Params) -> Result:
         if not (isfinite(p[0]) and isfinite(p[1])) or not self._streams.knows(int(p[0])):
@@ -238,16 +269,26 @@ class MavlinkServer:
             )
             self._tell(peer, value)
 
+    def _tell_text(self, severity: int, raw: bytes) -> None:
+        """Tell a STATUSTEXT, in numbered chunks when it is long."""
+        self._text_id = self._text_id % 65535 + 1
+        for number, begin in enumerate(range(0, max(1, len(raw)), TEXT_BYTES)):
+            chunk = raw[begin : begin + TEXT_BYTES]
+            text_id = self._text_id if len(raw) > TEXT_BYTES else 0
+            self._tell_all(mavlink.MAVLink_statustext_message(severity, chunk, text_id, number))
+
     def _tell_all(self, message: Any) -> None:
-        for peer in self._peers.values():
+        for peer in list(self._peers.values()):
             self._tell(peer, message)
 
     def _tell(self, peer: Peer, message: Any) -> None:
-        if message is None or self.silent:
+        if message is None or self._disturbance.silent:
+            return
+        if self._disturbance.mutes(message.get_type()):
             return
         data = message.pack(peer.codec)
         peer.codec.seq = (peer.codec.seq + 1) % 256
-        try:
-            self._socket.sendto(data, peer.address)
-        except OSError:
-            self.rejected_bytes += len(data)  # a full buffer loses a datagram, as UDP does
+        for leaving in peer.outward.carry(data):
+            if not self._lines.tell(peer.address, leaving):
+                # A full buffer loses a datagram; a TCP line that stalls is closed.
+                self.rejected_bytes += len(leaving)

@@ -125,6 +125,7 @@ class Steering:
             Mode.LOITER: self._hold_point,
             Mode.POSHOLD: self._hold_point,
             Mode.BRAKE: self._hold_point,
+            Mode.TAKEOFF: self._hold_point,
         }
         steer = with_position.get(mode)
         return steer() if steer is not None else _drift(0.0)

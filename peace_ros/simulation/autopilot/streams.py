@@ -5,15 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, degrees, pi, radians
+from math import cos, degrees, isfinite, pi, radians
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from peace_ros.simulation.autopilot.disturbance import Disturbance, Vector
 from peace_ros.simulation.autopilot.estimator import READY_S
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.modes import LandedState
 from peace_ros.simulation.autopilot.parameters import AutopilotParameters
+from peace_ros.simulation.autopilot.personality import EKF_STATUS, Personality
 
 METRES_PER_DEGREE = 111_319.49
 UNKNOWN_U16 = 65535
@@ -29,13 +31,20 @@ SENSORS = (
 class Streams:
     """Builds the messages; a builder returns None when there is nothing to say now."""
 
-    def __init__(self, parameters: AutopilotParameters) -> None:
+    def __init__(
+        self,
+        parameters: AutopilotParameters,
+        personality: Personality | None = None,
+        disturbance: Disturbance | None = None,
+    ) -> None:
         self._parameters = parameters
+        self._disturbance = disturbance or Disturbance()
+        estimator = (personality or Personality()).estimator_message
         self._builders: dict[int, Callable[[Flight], Any]] = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
-            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: local_position_ned,
-            mavlink.MAVLINK_MSG_ID_ATTITUDE: attitude,
-            mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: attitude_quaternion,
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self._local_position_ned,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: self._attitude_quaternion,
             mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position_int,
             mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: self._gps_raw_int,
             mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_sys_state,
@@ -43,6 +52,7 @@ class Streams:
             mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: self._distance_sensor,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: self.home_position,
             mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
+            estimator: ekf_status if estimator == EKF_STATUS else estimator_status,
         }
 
     def knows(self, message_id: int) -> bool:
@@ -80,14 +90,45 @@ class Streams:
         longitude = p.home_longitude_deg + east_m / (METRES_PER_DEGREE * shrink)
         return round(latitude * 1e7), round(longitude * 1e7)
 
+    def _reported(self, flight: Flight) -> tuple[Vector, Vector]:
+        d = self._disturbance
+        return (
+            d.reported_position(flight.position_m, self._parameters.home_altitude_msl_m),
+            d.reported_velocity(flight.physics.velocity_ned_m_s),
+        )
+
+    def _boot_ms(self, flight: Flight) -> int:
+        return round((flight.time_s + self._disturbance.clock_step_s) * 1000.0) & 0xFFFFFFFF
+
+    def _local_position_ned(self, flight: Flight) -> Any:
+        if not flight.estimator.reports_position(flight.time_s):
+            return None
+        position, velocity = self._reported(flight)
+        return mavlink.MAVLink_local_position_ned_message(
+            self._boot_ms(flight), *position, *velocity
+        )
+
+    def _attitude(self, flight: Flight) -> Any:
+        p = flight.physics
+        return mavlink.MAVLink_attitude_message(
+            self._boot_ms(flight), p.roll_rad, p.pitch_rad, p.yaw_rad, 0.0, 0.0, p.yaw_rate_rad_s
+        )
+
+    def _attitude_quaternion(self, flight: Flight) -> Any:
+        p = flight.physics
+        return mavlink.MAVLink_attitude_quaternion_message(
+            self._boot_ms(flight), *p.quaternion_ned_frd, 0.0, 0.0, p.yaw_rate_rad_s
+        )
+
     def _global_position_int(self, flight: Flight) -> Any:
         if not flight.estimator.reports_position(flight.time_s):
             return None
-        north, east, down = flight.position_m
+        (north, east, down), (v_north, v_east, v_down) = self._reported(flight)
+        if not isfinite(down):
+            return None  # whole millimetres cannot say that
         latitude, longitude = self._geodetic(north, east)
-        v_north, v_east, v_down = flight.physics.velocity_ned_m_s
         return mavlink.MAVLink_global_position_int_message(
-            _boot_ms(flight),
+            self._boot_ms(flight),
             latitude,
             longitude,
             round((self._parameters.home_altitude_msl_m - down) * 1000),
@@ -119,7 +160,7 @@ class Streams:
         tilt = min(flight.physics.tilt_rad, pi / 3)
         distance_cm = -flight.physics.down_m / cos(tilt) * 100.0
         return mavlink.MAVLink_distance_sensor_message(
-            _boot_ms(flight),
+            self._boot_ms(flight),
             20,
             round(self._parameters.rangefinder_max_m * 100),
             max(0, min(round(distance_cm), 65000)),
@@ -131,44 +172,19 @@ class Streams:
 
 
 def heartbeat(flight: Flight) -> Any:
-    """Return HEARTBEAT of a quadrotor under ArduPilot."""
+    """Return HEARTBEAT of a quadrotor."""
+    personality = flight.personality
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
     if flight.armed:
         base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
     status = mavlink.MAV_STATE_STANDBY if flight.landed else mavlink.MAV_STATE_ACTIVE
     return mavlink.MAVLink_heartbeat_message(
         mavlink.MAV_TYPE_QUADROTOR,
-        mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
+        personality.autopilot,
         base,
-        int(flight.mode),
+        personality.custom_mode(flight.mode),
         status,
         3,
-    )
-
-
-def local_position_ned(flight: Flight) -> Any:
-    """Return LOCAL_POSITION_NED, None while the filter has no position."""
-    if not flight.estimator.reports_position(flight.time_s):
-        return None
-    north, east, down = flight.position_m
-    return mavlink.MAVLink_local_position_ned_message(
-        _boot_ms(flight), north, east, down, *flight.physics.velocity_ned_m_s
-    )
-
-
-def attitude(flight: Flight) -> Any:
-    """Return ATTITUDE (Euler angles, radians)."""
-    p = flight.physics
-    return mavlink.MAVLink_attitude_message(
-        _boot_ms(flight), p.roll_rad, p.pitch_rad, p.yaw_rad, 0.0, 0.0, p.yaw_rate_rad_s
-    )
-
-
-def attitude_quaternion(flight: Flight) -> Any:
-    """Return ATTITUDE_QUATERNION (w, x, y, z)."""
-    p = flight.physics
-    return mavlink.MAVLink_attitude_quaternion_message(
-        _boot_ms(flight), *p.quaternion_ned_frd, 0.0, 0.0, p.yaw_rate_rad_s
     )
 
 
@@ -186,7 +202,43 @@ def sys_status(flight: Flight) -> Any:
     if not flight.estimator.gps:
         health &= ~mavlink.MAV_SYS_STATUS_SENSOR_GPS
     return mavlink.MAVLink_sys_status_message(
-        SENSORS, SENSORS, health, 200, 12400, -1, -1, 0, 0, 0, 0, 0, 0
+        SENSORS,
+        SENSORS,
+        health,
+        200,
+        12400,
+        -1,
+        round(flight.battery_remaining * 100.0),
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+    )
+
+
+def ekf_flags(flight: Flight) -> int:
+    """Return EKF_STATUS_FLAGS; ESTIMATOR_STATUS of PX4 gives the same bits the same meaning."""
+    known = mavlink.ESTIMATOR_ATTITUDE | mavlink.ESTIMATOR_VELOCITY_VERT
+    known |= mavlink.ESTIMATOR_POS_VERT_ABS
+    if not flight.has_position:
+        return int(known | mavlink.ESTIMATOR_CONST_POS_MODE)
+    known |= mavlink.ESTIMATOR_VELOCITY_HORIZ
+    known |= mavlink.ESTIMATOR_POS_HORIZ_REL | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
+    known |= mavlink.ESTIMATOR_POS_HORIZ_ABS | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
+    return int(known)
+
+
+def ekf_status(flight: Flight) -> Any:
+    """Return EKF_STATUS_REPORT (ArduPilot)."""
+    return mavlink.MAVLink_ekf_status_report_message(ekf_flags(flight), 0.1, 0.1, 0.1, 0.1, 0.0)
+
+
+def estimator_status(flight: Flight) -> Any:
+    """Return ESTIMATOR_STATUS (PX4)."""
+    return mavlink.MAVLink_estimator_status_message(
+        round(flight.time_s * 1e6), ekf_flags(flight), 0.1, 0.1, 0.1, 0.1, 0.0, 0.0, 0.5, 0.5
     )
 
 
@@ -203,7 +255,3 @@ def autopilot_version(_flight: Flight) -> Any:
     return mavlink.MAVLink_autopilot_version_message(
         capabilities, version, 0, 0, 0, empty, empty, empty, 0, 0, 0
     )
-
-
-def _boot_ms(flight: Flight) -> int:
-    return round(flight.time_s * 1000.0) & 0xFFFFFFFF

@@ -18,6 +18,8 @@ from peace_ros.simulation.drawing.plan import Barrier, Thing
 
 # Channels of a sprite: fixed grey, paint (how much of the own colour), opacity, height in metres.
 _GREY, _PAINT, _ALPHA, _HEIGHT = range(4)
+_SEEN = 0.1
+"""A thing that covers less than this of every pixel has no pixel of its own."""
 
 
 class _Sketch:
@@ -258,7 +260,8 @@ def _composite(
     part *= (1.0 - alpha)[..., None]
     part += drawn[..., _PAINT, None] * paint + drawn[..., _GREY, None]
     # A person is about one pixel wide from high up: the pixel it fills most is its pixel.
-    own = alpha >= min(0.5, 0.75 * float(alpha.max()))
+    # What only its transparent corner reaches has none.
+    own = alpha >= max(_SEEN, min(0.5, 0.75 * float(alpha.max())))
     canvas.labels[region][own] = thing.label
     tall = np.where(alpha > 0.3, drawn[..., _HEIGHT], 0.0)
     np.maximum(canvas.height_m[region], tall, out=canvas.height_m[region])

@@ -1,0 +1,93 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Is a reported position to be believed? Jumps are not, as long as we fly by it; pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import dist
+
+Vector = tuple[float, float, float]
+SLACK_M_S = 3.0
+"""How much the velocity may be wrong or change between two reports."""
+FASTEST_M_S = 20.0
+GAP_S = 1.0
+"""Reports farther apart are compared by the fastest speed only."""
+SETTLED_S = 2.0
+"""Reports that agree with each other for so long are believed again, when somebody else flies."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """One LOCAL_POSITION_NED."""
+
+    boot_ms: int
+    position_m: Vector
+    velocity_m_s: Vector
+
+
+class JumpWatch:
+    """Compares each position with where the one before it led.
+
+    A jump is an EKF reset or a fault; whichever it is, map and altitude no longer mean what they
+    meant. While we have control it is not believed until the position comes back to where it was;
+    while somebody else flies, as soon as the new one has been steady for two seconds.
+
+    Args:
+        limit_m: Deviation that is still believed.
+    """
+
+    def __init__(self, limit_m: float) -> None:
+        self._limit_m = limit_m
+        self._believed: Report | None = None
+        self._newest: Report | None = None
+        self._steady_since_ms = 0
+        self.problem = ''
+        """Why the position is not believed, empty when it is."""
+
+    def forget(self) -> None:
+        """Believe whatever comes next."""
+        self._believed = self._newest = None
+        self.problem = ''
+
+    def believes(self, report: Report, *, in_control: bool) -> bool:
+        """Take a report; tell whether it may be used."""
+        newest, self._newest = self._newest, report
+        if newest is None or self._deviation_m(newest, report) > 0.0:
+            self._steady_since_ms = report.boot_ms
+        if self._believed is None:
+            return self._believe(report)
+        if self.problem:
+            # The vehicle has been told to stand still since: it must be where it was.
+            back = dist(report.position_m, self._believed.position_m) <= self._limit_m
+            settled_ms = report.boot_ms - self._steady_since_ms
+            if back or (not in_control and settled_ms >= SETTLED_S * 1e3):
+                return self._believe(report)
+            return False
+        excess_m = self._deviation_m(self._believed, report)
+        if excess_m <= 0.0:
+            return self._believe(report)
+        jump_m = dist(report.position_m, self._believed.position_m)
+        self.problem = (
+            f'the reported position jumped by {jump_m:.1f} m, which no flight explains (limit '
+            f'{self._limit_m:g} m): it is not believed; take over, engage again when it is right'
+        )
+        return False
+
+    def _believe(self, report: Report) -> bool:
+        self._believed, self.problem = report, ''
+        return True
+
+    def _deviation_m(self, before: Report, after: Report) -> float:
+        """Return by how much a step exceeds what is allowed; 0 or less when it does not."""
+        dt_s = (after.boot_ms - before.boot_ms) / 1e3
+        if not 0.0 <= dt_s <= GAP_S:
+            moved_m = dist(after.position_m, before.position_m)
+            return moved_m - self._limit_m - FASTEST_M_S * abs(dt_s)
+        expected = tuple(
+            p + dt_s * (v + w) / 2.0
+            for p, v, w in zip(
+                before.position_m, before.velocity_m_s, after.velocity_m_s, strict=True
+            )
+        )
+        return dist(after.position_m, expected) - self._limit_m - SLACK_M_S * dt_s
