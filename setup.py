@@ -46,8 +46,8 @@ setup(
     ],
     entry_points={
         'console_scripts': [
-            'peace = peace_ros.cli:main',
-            *(f'{node} = peace_ros.nodes.{node}:main' for node in NODES),
+            'peace = peace_ros.entry:peace',
+            *(f'{node} = peace_ros.entry:{node}' for node in NODES),
         ],
     },
 )

@@ -47,7 +47,7 @@ def generate_launch_description() -> LaunchDescription:
     nodes = (
         ('prompt_generator', [preset, clock], [image]),
         ('segmentation', [preset, clock], [image]),
-        ('landing', [preset, clock, vehicle], topics),
+        ('landing', [preset, clock, vehicle], [image, *topics]),
     )
     return LaunchDescription(
         [

@@ -113,6 +113,17 @@ class ProcessGroup:
                     + log_tail(each.log)
                 )
 
+    def status(self, name: str) -> int | None:
+        """Return the exit status of a process, None while it lives or when there is none."""
+        found = [each for each in self._running if each.name == name]
+        return found[-1].process.poll() if found else None
+
+    def send(self, name: str, number: signal.Signals) -> None:
+        """Send a signal to one process, if it lives."""
+        for each in self._running:
+            if each.name == name and each.process.poll() is None:
+                each.process.send_signal(number)
+
     def stop(self, name: str) -> None:
         """Stop one process and forget it."""
         chosen = [each for each in self._running if each.name == name]

@@ -17,7 +17,7 @@ from peace_ros.simulation.camera import NadirCamera
 if TYPE_CHECKING:
     from peace_ros.demo.history import History
 
-OUTCOMES = ('handover', 'no_zone', 'timeout', 'aborted', 'error')
+OUTCOMES = ('handover', 'no_zone', 'timeout', 'battery', 'aborted', 'error')
 _MIRROR_SAMPLES = 100
 REACHED_TOLERANCE_M = 2.0
 """A hand-over counts when the vehicle truly is at most this far from its altitude."""
@@ -79,6 +79,7 @@ class Summary:
                 'no_zone': 'No safe place was found',
                 'timeout': 'Time ran out',
                 'aborted': 'The landing was aborted',
+                'battery': 'The battery ran low',
                 'error': 'The demo failed',
             }
             return f'{names[self.outcome]}: {self.reason}' if self.reason else names[self.outcome]

@@ -1,15 +1,108 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What speaks against beginning a landing now."""
+"""Beginning and ending a landing: the services, and what speaks against it."""
 
 from __future__ import annotations
 
+import threading
 from math import isfinite
+from typing import Protocol, cast
 
-from peace_ros.domain import Telemetry
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from peace_ros.domain import Telemetry, VehicleError
 from peace_ros.landing import LandingParameters, State
+from peace_ros.vehicle import VehicleLink
+
+SILENT_STATES = frozenset({State.IDLE, State.ABORTED})
+"""States in which nothing is submitted to the vehicle."""
 
 _MAY_BEGIN = frozenset({State.IDLE, State.HOLD, State.HANDOVER, State.ABORTED})
+
+
+class Engageable(Protocol):
+    """What the services need of the node; it is an rclpy Node besides."""
+
+    def reason_against(self) -> str:
+        """Return what speaks against beginning now, empty when nothing does."""
+
+    def link(self) -> VehicleLink | None:
+        """Return the vehicle, None until it is reached."""
+
+    def begin(self) -> str:
+        """Begin the landing; return what speaks against it, empty when it began."""
+
+    def hold_level(self) -> str:
+        """Hold level without a position where that was chosen; return what became of it."""
+
+    def end_landing(self) -> bool:
+        """End the landing; return whether one was flown."""
+
+
+class EngagementServices:
+    """``~/engage`` and ``~/disengage``, and engaging once by itself where that is asked for.
+
+    Asking for control may take seconds, in which steps and heatmaps must go on: the services have
+    a callback group of their own.
+    """
+
+    def __init__(self, node: Engageable, *, auto: bool) -> None:
+        self._node = node
+        self._auto_due = auto
+        self._ros = cast('Node', node)
+        beside = MutuallyExclusiveCallbackGroup()
+        for name, callback in (('engage', self._on_engage), ('disengage', self._on_disengage)):
+            self._ros.create_service(Trigger, f'~/{name}', callback, callback_group=beside)
+
+    def engage_when_ready(self) -> None:
+        """Engage beside the caller, once, when it was asked for and nothing speaks against it."""
+        if self._auto_due and not self._node.reason_against():
+            self._auto_due = False
+            threading.Thread(target=self._auto_engage, name='auto_engage', daemon=True).start()
+
+    def _auto_engage(self) -> None:
+        self._engage(by_person=False)
+
+    def _on_engage(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        problem = self._engage(by_person=True)
+        instead = self._node.hold_level() if problem else ''
+        problem = f'{problem}; {instead}' if instead else problem
+        response.success, response.message = not problem, problem or 'engaged'
+        return response
+
+    def _engage(self, *, by_person: bool) -> str:
+        """Ask for control once; return what speaks against the landing, empty when it began."""
+        link = self._node.link()
+        problem = self._node.reason_against()
+        if not problem and link is not None:
+            problem = _ask_for_control(link, by_person=by_person)
+        problem = problem or self._node.begin()
+        if problem:
+            self._ros.get_logger().warning(f'not engaged: {problem}')
+        else:
+            self._ros.get_logger().info('engaged')
+        return problem
+
+    def _on_disengage(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        self._auto_due = False
+        was_flying = self._node.end_landing()
+        response.success = True
+        response.message = 'disengaged: the vehicle stops and holds' if was_flying else 'was idle'
+        self._ros.get_logger().info(response.message)
+        return response
+
+
+def _ask_for_control(link: VehicleLink, *, by_person: bool) -> str:
+    """Return why the vehicle does not obey, empty when it does."""
+    try:
+        result = link.request_control(by_person=by_person)
+    except VehicleError as error:
+        return str(error)
+    return '' if result else f'control {result.answer.value}: {result.reason}'
 
 
 def reason_against(

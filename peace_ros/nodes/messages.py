@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable
-from math import cos, isfinite, sin
+from math import cos, sin
 from typing import Any
 
 import numpy as np
@@ -29,16 +29,14 @@ from peace_ros.domain import (
     Prompt,
     Setpoint,
     Site,
-    VehicleError,
 )
 from peace_ros.domain.geometry import (
-    attitude_enu_flu_to_ned_frd,
     attitude_ned_frd_to_enu_flu,
-    enu_to_ned,
     ned_to_enu,
     yaw_from_quaternion,
 )
 from peace_ros.images import jpeg_from_rgb, pixels_from_raw, rgb_from_message
+from peace_ros.poses import pose_from_enu_flu
 from peace_ros.prompting.pairs import prompt_from_pairs, prompt_pairs
 
 NANOSECONDS = 1_000_000_000
@@ -162,28 +160,13 @@ def pose_from_message(message: PoseStamped) -> Pose:
         VehicleError: a value is not finite or the quaternion is not of unit length.
 
     """
-    at, turn = message.pose.position, message.pose.orientation
-    return _pose(stamp_ns(message), (at.x, at.y, at.z), (turn.w, turn.x, turn.y, turn.z))
+    return pose_from_enu_flu(stamp_ns(message), message.pose.position, message.pose.orientation)
 
 
 def pose_from_transform(transform: TransformStamped) -> Pose:
     """Return the pose of a tf transform local frame -> vehicle, as :func:`pose_from_message`."""
-    at, turn = transform.transform.translation, transform.transform.rotation
-    return _pose(stamp_ns(transform), (at.x, at.y, at.z), (turn.w, turn.x, turn.y, turn.z))
-
-
-def _pose(
-    at_ns: int, enu: tuple[float, float, float], turn: tuple[float, float, float, float]
-) -> Pose:
-    length = sum(each * each for each in turn) ** 0.5
-    if not all(map(isfinite, (*enu, *turn))) or not 0.9 < length < 1.1:
-        raise VehicleError(
-            f'pose {enu} with quaternion {turn} (length {length:.2f}): publish finite metres and '
-            'a quaternion of length 1'
-        )
-    w, x, y, z = (each / length for each in turn)
-    north, east, down = enu_to_ned(*enu)
-    return Pose(at_ns, north, east, down, attitude_enu_flu_to_ned_frd((w, x, y, z)), -down)
+    body = transform.transform
+    return pose_from_enu_flu(stamp_ns(transform), body.translation, body.rotation)
 
 
 def transform_from_pose(pose: Pose, child: str, parent: str = LOCAL_FRAME) -> TransformStamped:

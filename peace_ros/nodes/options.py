@@ -95,6 +95,16 @@ class LandingOptions:
     auto_engage: bool = parameter(
         False, 'Engage as soon as nothing speaks against it, once; otherwise ~/engage is called'
     )
+    registration: bool = parameter(
+        False,
+        'While the autopilot knows attitude and altitude but no position, carry the map on by '
+        'comparing camera images (subscribes to image)',
+    )
+    image_transport: str = parameter(
+        'raw',
+        'With registration: take image (raw) or image/compressed (JPEG, PNG)',
+        choices=_TRANSPORTS,
+    )
     pose_source: str = parameter(
         'topic',
         'With interface twist: pose from the topic pose (PoseStamped) or from tf',

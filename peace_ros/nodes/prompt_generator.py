@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,8 +38,15 @@ from peace_ros.prompting import (
 PARAMETERS: tuple[Group, ...] = (('', PromptingParameters), ('', PromptGeneratorOptions))
 
 
-def create_generator(parameters: PromptingParameters) -> PromptGenerator:
-    """Make the generator; a static template needs neither a model nor vocabularies."""
+def create_generator(
+    parameters: PromptingParameters, say: Callable[[str], object] | None = None
+) -> PromptGenerator:
+    """Make the generator; a static template needs neither a model nor vocabularies.
+
+    Args:
+        parameters: of the prompts.
+        say: is told what the networks run on and take.
+    """
     if not categories_of(resolve_template(parameters.template)):
         return PromptGenerator(None, None, parameters)
     vocabularies = load_vocabularies(parameters.vocabularies)
@@ -49,6 +56,8 @@ def create_generator(parameters: PromptingParameters) -> PromptGenerator:
         providers=parameters.providers,
         cache_dir=Path(parameters.cache_dir).expanduser() if parameters.cache_dir else None,
     )
+    if say is not None:
+        say(f'model: {encoder.footprint}')
     return PromptGenerator(encoder, vocabularies, parameters)
 
 
@@ -68,7 +77,7 @@ class PromptGeneratorNode(PeaceNode):
         """
         super().__init__('prompt_generator', *PARAMETERS, **options)
         parameters = self.filled(PromptingParameters)
-        self._generator = generator or create_generator(parameters)
+        self._generator = generator or create_generator(parameters, self.get_logger().info)
         self._last_template = ''
         self._prompt_out = self.create_publisher(DiagnosticArray, 'prompt', RESULT)
         self._diagnostics_out = self.create_publisher(DiagnosticArray, '/diagnostics', RESULT)

@@ -33,6 +33,7 @@ from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.worker import NewestWorker
 from peace_ros.prompting import categories_of, resolve_template
 from peace_ros.segmentation import (
+    CameraWatch,
     SegmentationParameters,
     Segmenter,
     create_segmenter,
@@ -64,6 +65,7 @@ class SegmentationNode(PeaceNode):
         self._static = None if categories_of(template) else Prompt(template, 0)
         self._segmenter = segmenter or self._create_segmenter()
         self._board = PromptBoard()
+        self._camera = CameraWatch()
         self._prepared: set[str] = set()
         self._heatmap_out = self.create_publisher(Image, 'heatmap', IMAGE_OUT)
         self._overlay_out = self.create_publisher(CompressedImage, 'overlay/compressed', IMAGE_OUT)
@@ -81,6 +83,7 @@ class SegmentationNode(PeaceNode):
         segmenter = create_segmenter(
             parameters.family, parameters.bundle, load_terms(parameters.terms), parameters
         )
+        self.get_logger().info(f'model: {segmenter.footprint}')
         for term, words in segmenter.unknown_terms.items():
             self.get_logger().warning(
                 f'term {term!r}: the model has never learned {", ".join(words)} and cannot see it'
@@ -124,6 +127,7 @@ class SegmentationNode(PeaceNode):
         prompt, own = chosen
         began = time.monotonic()
         frame = frame_from_message(message)
+        self._camera.check(frame)
         heatmap = self._segmenter.segment(frame, prompt)
         self._heatmap_out.publish(heatmap_to_image(heatmap, message.header.frame_id))
         work_s = time.monotonic() - began

@@ -4,16 +4,31 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PointStamped, TwistStamped
+from rclpy.node import Node
 
 from peace_ros.domain import Telemetry
 from peace_ros.landing import Decision, State
 from peace_ros.landing.pairs import decision_pairs
-from peace_ros.nodes.messages import ERROR, OK, WARN, diagnostic_array
+from peace_ros.nodes.engagement import SILENT_STATES
+from peace_ros.nodes.messages import (
+    ERROR,
+    OK,
+    WARN,
+    diagnostic_array,
+    setpoint_to_twist_stamped,
+    site_to_message,
+)
+from peace_ros.nodes.qos import RESULT
 
-_CONCERNING = frozenset({State.WAITING, State.CLIMBING, State.RESTARTING, State.HOLD})
+_STATUS_PERIOD_S = 0.1
+_CONCERNING = frozenset(
+    {State.WAITING, State.CLIMBING, State.RESTARTING, State.RETURNING, State.HOLD}
+)
 
 
 @dataclass(frozen=True)
@@ -27,6 +42,30 @@ class Situation:
     """Why the vehicle cannot be reached, empty when it can."""
     sender: str = ''
     """What the timed sender does."""
+
+
+class DecisionPublisher:
+    """Topics ``landing/status``, ``landing/setpoint`` and ``landing/site``."""
+
+    def __init__(self, node: Node) -> None:
+        self._status = node.create_publisher(DiagnosticArray, 'landing/status', RESULT)
+        self._setpoint = node.create_publisher(TwistStamped, 'landing/setpoint', RESULT)
+        self._site = node.create_publisher(PointStamped, 'landing/site', RESULT)
+        self._status_due_s = 0.0
+
+    def publish(self, decision: Decision, situation: Situation, at_ns: int) -> None:
+        """Publish a decision; the set-point always, the rest at 10 Hz of the steady clock."""
+        if decision.state not in SILENT_STATES:
+            self._setpoint.publish(setpoint_to_twist_stamped(decision.setpoint, at_ns))
+        now_s = time.monotonic()
+        if now_s < self._status_due_s:
+            return
+        self._status_due_s = now_s + _STATUS_PERIOD_S
+        self._status.publish(status_message(decision, situation, at_ns))
+        told = situation.telemetry
+        if decision.site is not None and told is not None and told.pose is not None:
+            ground_down_m = told.pose.down_m + told.pose.altitude_agl_m
+            self._site.publish(site_to_message(decision.site, at_ns, ground_down_m))
 
 
 def status_message(decision: Decision, situation: Situation, at_ns: int) -> DiagnosticArray:

@@ -8,19 +8,28 @@ from collections.abc import Callable
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, Twist
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.domain import ConfigurationError, Pose, Setpoint, VehicleError
+from peace_ros.landing import Decision, State
 from peace_ros.nodes.connection import Connection
+from peace_ros.nodes.handover import AfterHandover
 from peace_ros.nodes.messages import pose_from_message, pose_from_transform
 from peace_ros.nodes.options import LandingOptions
 from peace_ros.nodes.qos import COMMAND, POSE_IN
 from peace_ros.nodes.runtime import PeaceNode
 from peace_ros.nodes.twist_link import TwistLink
-from peace_ros.vehicle import VehicleLink, VehicleParameters, open_vehicle
+from peace_ros.vehicle import MavlinkLink, VehicleLink, VehicleParameters, open_vehicle
 
 _TRY_S = 3.0
 """One attempt to hear an autopilot; between attempts the node says that it hears none."""
 _LAST_ZEROS = 3
+_HEALTH: dict[State, int] = {
+    State.IDLE: mavlink.MAV_STATE_STANDBY,
+    State.ABORTED: mavlink.MAV_STATE_STANDBY,
+    State.HOLD: mavlink.MAV_STATE_CRITICAL,
+}
+"""MAV_STATE of our HEARTBEAT; in every other state ACTIVE."""
 
 
 class VehicleAccess:
@@ -30,6 +39,10 @@ class VehicleAccess:
         self, node: PeaceNode, options: LandingOptions, parameters: VehicleParameters
     ) -> None:
         self._node = node
+        self._parameters = parameters
+        self._after = AfterHandover(
+            parameters.after_handover, lambda sentence: node.say('handover', sentence)
+        )
         self._connection: Connection[VehicleLink] | None = None
         self._twist: TwistLink | None = None
         if options.interface == 'twist':
@@ -57,6 +70,44 @@ class VehicleAccess:
         """Why there is no vehicle, empty when there is."""
         return '' if self._connection is None else self._connection.problem
 
+    @property
+    def reason_against(self) -> str:
+        """Why a landing cannot begin as far as the vehicle is concerned, empty when it can."""
+        link = self.link
+        if self.problem or not isinstance(link, MavlinkLink):
+            return self.problem
+        return link.problem or link.position_problem
+
+    def follow(self, decision: Decision) -> None:
+        """Tell the vehicle how we are, and do what follows a hand-over; once per step."""
+        link = self.link
+        if not isinstance(link, MavlinkLink):
+            return
+        if link.problem:
+            self._node.say('vehicle', link.problem)
+        link.report_health(int(_HEALTH.get(decision.state, mavlink.MAV_STATE_ACTIVE)))
+        handed_over = decision.state is State.HANDOVER
+        self._after.follow(link, decision.site, handed_over=handed_over)
+
+    def hold_level(self) -> str:
+        """Hold level without a position where that was chosen; return what became of it.
+
+        Empty when it was not chosen, or when there is a position or no flying vehicle.
+        """
+        link = self.link
+        if not self._parameters.attitude_fallback or not isinstance(link, MavlinkLink):
+            return ''
+        told = link.telemetry()
+        if not link.position_problem or not told.armed or told.landed:
+            return ''
+        try:
+            result = link.request_level_hold()
+        except VehicleError as error:
+            return str(error)
+        if result:
+            return 'instead it holds level, height and heading, and drifts with the wind'
+        return f'holding level {result.answer.value}: {result.reason}'
+
     def stop_vehicle(self) -> None:
         """Send zero velocity, if the vehicle still obeys us."""
         link = self.link
@@ -70,6 +121,7 @@ class VehicleAccess:
 
     def close(self) -> None:
         """Release the line."""
+        self._after.end()
         if self._connection is not None:
             self._connection.close()
 

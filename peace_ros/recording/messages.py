@@ -8,15 +8,15 @@ Builders make messages of the rosbags type store.
 
 from __future__ import annotations
 
-from math import atan, isfinite
+from math import atan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Frame, Pose, RecordingError
-from peace_ros.domain.geometry import attitude_enu_flu_to_ned_frd, enu_to_ned
+from peace_ros.domain import Frame, Pose, RecordingError, VehicleError
 from peace_ros.images import jpeg_from_rgb, rgb_from_message
+from peace_ros.poses import pose_from_enu_flu
 from peace_ros.recording.bag import TYPESTORE
 
 if TYPE_CHECKING:
@@ -58,24 +58,10 @@ def pose_from_message(message: Any) -> Pose:
     """
     pose = message.pose
     pose = pose.pose if hasattr(pose, 'pose') else pose
-    position, turn = pose.position, pose.orientation
-    numbers = (position.x, position.y, position.z, turn.w, turn.x, turn.y, turn.z)
-    length = sum(each * each for each in numbers[3:]) ** 0.5
-    if not all(isfinite(each) for each in numbers) or not 0.9 < length < 1.1:
-        raise RecordingError(
-            f'pose {tuple(round(float(each), 3) for each in numbers)} at {stamp_ns_of(message)} '
-            'ns: it must be finite with a quaternion of unit length'
-        )
-    w, x, y, z = (float(each) / length for each in numbers[3:])
-    north, east, down = enu_to_ned(float(position.x), float(position.y), float(position.z))
-    return Pose(
-        stamp_ns=stamp_ns_of(message),
-        north_m=north,
-        east_m=east,
-        down_m=down,
-        quaternion_ned_frd=attitude_enu_flu_to_ned_frd((w, x, y, z)),
-        altitude_agl_m=-down,
-    )
+    try:
+        return pose_from_enu_flu(stamp_ns_of(message), pose.position, pose.orientation)
+    except VehicleError as error:
+        raise RecordingError(str(error)) from error
 
 
 def fov_x_rad_of(camera_info: Any) -> float:

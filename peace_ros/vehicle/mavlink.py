@@ -7,6 +7,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from math import isfinite
 from typing import Any
 
@@ -25,6 +26,7 @@ from peace_ros.vehicle.peer import Peer
 from peace_ros.vehicle.requests import Requests
 from peace_ros.vehicle.result import Answer, RequestResult
 from peace_ros.vehicle.signing import Signer
+from peace_ros.vehicle.sinking import SinkWatch
 from peace_ros.vehicle.streams import StreamKeeper
 from peace_ros.vehicle.transport import Source
 from peace_ros.vehicle.wire import Wire
@@ -161,6 +163,8 @@ class MavlinkLink:
         with self._changed:
             now_ns = time.monotonic_ns()
             told = self._heard().telemetry(now_ns)
+            if not told.in_control:
+                self._sinking.tell(0.0)
             self._sinking.take(None if told.pose is None else told.pose.altitude_agl_m, now_ns)
             return replace(told, pose=None) if self._sinking.problem else told
 
@@ -211,8 +215,9 @@ class MavlinkLink:
                 Answer.REFUSED,
                 f'{self.telemetry().mode} was chosen after we had control: a person must engage',
             )
-        with self._changed:
-            self._sinking.forget()
+        if by_person:
+            with self._changed:
+                self._sinking.forget()
         if problem := self.position_problem:
             return RequestResult(Answer.REFUSED, problem)
         self._control.ask_anew()

@@ -48,8 +48,8 @@ class SinkWatch:
         self._told_m = self._down_m_s = 0.0
 
     def tell(self, v_down_m_s: float) -> None:
-        """Note what the vehicle is told from now on; climbing counts as standing."""
-        self._down_m_s = max(0.0, v_down_m_s)
+        """Note what the vehicle is told from now on; a climb is a negative way."""
+        self._down_m_s = v_down_m_s
 
     def take(self, altitude_m: float | None, steady_ns: int) -> None:
         """Look at the altitude that is reported now; None is unknown, and proves nothing."""
@@ -72,7 +72,9 @@ class SinkWatch:
         told_end, seen_begin = self._before(at_s - LAG_S), self._before(at_s - span_s)
         if told_begin is None or told_end is None or seen_begin is None:
             return
-        told_m = told_end.told_m - told_begin.told_m
+        # With lag and without: after a change of mind either may be right.
+        newest_m = self._marks[-1].told_m
+        told_m = min(told_end.told_m - told_begin.told_m, newest_m - seen_begin.told_m)
         sunk_m = seen_begin.altitude_m - self._marks[-1].altitude_m
         if told_m > LEAST_M and sunk_m < LEAST_PART * told_m:
             self.problem = (

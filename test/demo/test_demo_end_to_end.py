@@ -110,8 +110,11 @@ def test_ctrl_c_ends_every_process_and_leaves_a_summary(tmp_path) -> None:
 
 
 def test_a_preset_without_a_model_is_refused_in_words(tmp_path) -> None:
-    with start_demo(tmp_path / 'run', '--config', 'peace_fs', '--speed', '2') as demo:
+    preset = tmp_path / 'mine.yaml'
+    values = {'family': 'fastsam', 'bundle': 'fastsam-that-nobody-made'}
+    preset.write_text(json.dumps({'segmentation': {'ros__parameters': values}}))
+    with start_demo(tmp_path / 'run', '--config', str(preset), '--speed', '2') as demo:
         output, _ = demo.communicate(timeout=120.0)
     assert demo.returncode == 1
-    assert 'fastsam' in output
+    assert 'fastsam-that-nobody-made' in output
     assert processes_of(tmp_path / 'run') == []

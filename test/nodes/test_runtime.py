@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -78,14 +79,25 @@ def test_ends_quietly_on_a_signal(number):
     assert 'Traceback' not in rest
 
 
+def test_the_model_is_stated_with_its_provider_and_memory():
+    with start('segmentation', '-p', 'template:=DD', '-p', 'threads:=1') as process:
+        assert process.stdout is not None
+        said = process.stdout.readline() + process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        process.stdout.read()
+        assert process.wait(20) == 0
+    stated = r'clipseg-small \w+ on CPUExecutionProvider, 1 thread, \d+ MB, warmed up in [\d.]+ s'
+    assert re.search(stated, said), said
+
+
 @pytest.mark.parametrize(
     ('node', 'arguments', 'words'),
     [
         ('segmentation', ('-p', 'threads:=0'), 'threads = 0: must lie between 1 and 64'),
         (
             'segmentation',
-            ('--params-file', str(ROOT / 'config' / 'presets' / 'peace_fs.yaml')),
-            'fastsam',
+            ('-p', 'family:=fastsam', '-p', 'bundle:=fastsam-that-nobody-made'),
+            'fastsam-that-nobody-made',
         ),
         ('prompt_generator', ('--params-file', '/no/such.yaml'), '/no/such.yaml'),
     ],

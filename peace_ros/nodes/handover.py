@@ -1,0 +1,86 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What follows HANDOVER: hold, the autopilot's landing, or LANDING_TARGET for the next stage."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+from peace_ros.domain import Site, VehicleError
+from peace_ros.vehicle import MavlinkLink
+
+_PERIOD_S = 0.1
+_ATTEMPTS = 3
+_PAUSE_S = 2.0
+
+
+class AfterHandover:
+    """Carries out one policy once per HANDOVER.
+
+    Args:
+        policy: ``hold``, ``land`` or ``landing_target``.
+        say: Takes a sentence about what became of it.
+    """
+
+    def __init__(self, policy: str, say: Callable[[str], None]) -> None:
+        self._policy, self._say = policy, say
+        self._site: Site | None = None
+        self._begun = False
+        self._ended = threading.Event()
+        self._due_s = 0.0
+
+    def follow(self, link: MavlinkLink, site: Site | None, *, handed_over: bool) -> None:
+        """Do what is due; never blocks.
+
+        Args:
+            link: The vehicle.
+            site: The newest site, None when none is known now.
+            handed_over: The state is HANDOVER.
+        """
+        if not handed_over:
+            self._begun = False
+            self._site = None
+            self._ended.set()
+            return
+        self._site = site or self._site
+        if self._policy == 'landing_target':
+            self._point(link)
+        elif self._policy == 'land' and not self._begun:
+            self._begun, self._ended = True, threading.Event()
+            arguments = (link, self._ended)
+            threading.Thread(target=self._land, args=arguments, daemon=True).start()
+
+    def end(self) -> None:
+        """Ask for nothing any more."""
+        self._ended.set()
+
+    def _point(self, link: MavlinkLink) -> None:
+        now_s = time.monotonic()
+        told = link.telemetry()
+        site = self._site
+        if now_s < self._due_s or site is None or told.pose is None:
+            return
+        self._due_s = now_s + _PERIOD_S
+        ground_down_m = told.pose.down_m + told.pose.altitude_agl_m
+        try:
+            link.send_landing_target((site.north_m, site.east_m, ground_down_m), told.pose)
+        except VehicleError as error:
+            self._say(f'LANDING_TARGET was not sent: {error}')
+
+    def _land(self, link: MavlinkLink, ended: threading.Event) -> None:
+        for _ in range(_ATTEMPTS):
+            if ended.is_set():
+                return
+            try:
+                result = link.request_land()
+            except VehicleError as error:
+                self._say(f'landing after the hand-over: {error}')
+            else:
+                if result:
+                    self._say('handed over: the autopilot lands by itself')
+                    return
+                self._say(f'landing after the hand-over {result.answer.value}: {result.reason}')
+            if ended.wait(_PAUSE_S):
+                return
