@@ -220,16 +220,52 @@ def replay(
 @app.command(context_settings=_HANDED_ON)
 @_in_one_sentence
 def benchmark(context: typer.Context) -> None:
-    """Time CLIPSeg frame by frame, beside the ways that others run it."""
+    """Time CLIPSeg and FastSAM frame by frame, beside the ways that others run them."""
     from peace_ros.evaluation.benchmark import command
 
     _hand_on(command.benchmark, context)
 
 
+@app.command(context_settings=_HANDED_ON)
+@_in_one_sentence
+def faults(context: typer.Context) -> None:
+    """Put every fault into a flight of the real processes and judge what happens."""
+    from peace_ros.faults import command
+
+    _hand_on(command.faults, context)
+
+
+@app.command(context_settings=_HANDED_ON)
+@_in_one_sentence
+def evaluate(context: typer.Context) -> None:
+    """Measure on labelled images how safe what the heatmaps call safe is."""
+    from peace_ros.evaluation.segmentation import command
+
+    _hand_on(command.evaluate, context)
+
+
+@app.command(context_settings=_HANDED_ON)
+@_in_one_sentence
+def ablate(context: typer.Context) -> None:
+    """Measure what vocabularies, templates, words, fusion and thresholds are worth."""
+    from peace_ros.evaluation.ablation import command
+
+    _hand_on(command.ablate, context)
+
+
+@app.command(context_settings=_HANDED_ON)
+@_in_one_sentence
+def words(context: typer.Context) -> None:
+    """Measure how often CLIP names the weather, light or look of a frame."""
+    from peace_ros.evaluation import words as command
+
+    _hand_on(command.words, context)
+
+
 @models_app.command(context_settings=_HANDED_ON)
 @_in_one_sentence
 def export(context: typer.Context) -> None:
-    """Export CLIP or CLIPSeg, verify it against the reference, and put the bundle in place."""
+    """Export CLIP, CLIPSeg or FastSAM, verify it against its reference, put it in place."""
     from peace_ros.inference.export import commands
 
     _hand_on(commands.export, context)
@@ -247,14 +283,24 @@ def fetch(context: typer.Context) -> None:
 @models_app.command('list')
 @_in_one_sentence
 def models_list() -> None:
-    """List the bundles that ship with the package."""
-    from peace_ros.inference import Bundle
+    """List the bundles that ship with the package, and your own."""
+    from peace_ros.domain import BundleError
+    from peace_ros.inference.bundle import MANIFEST_NAME, user_models_dir
+    from peace_ros.inference.manifest import parse_manifest
     from peace_ros.resources import models_dir
 
-    for manifest in sorted(models_dir().glob('*/manifest.json')):
-        bundle = Bundle.load(manifest.parent)
-        size = sum(entry.bytes for entry in bundle.manifest.files.values())
-        typer.echo(f'{bundle.manifest.name}  {bundle.manifest.family}  {size / 1e6:.1f} MB')
+    for place in dict.fromkeys((models_dir(), user_models_dir())):
+        # What is under way or set aside begins with a dot.
+        for path in sorted(place.glob(f'[!.]*/{MANIFEST_NAME}')):
+            try:
+                manifest = parse_manifest(path.read_bytes(), str(path))
+            except BundleError as error:
+                typer.echo(f'{path.parent.name}  cannot be used: {error}')
+                continue
+            size_mb = sum(entry.bytes for entry in manifest.files.values()) / 1e6
+            typer.echo(
+                f'{path.parent.name}  {manifest.family}  {manifest.precision}  {size_mb:.1f} MB'
+            )
 
 
 @models_app.command('info')
@@ -275,6 +321,10 @@ def models_verify(name: Annotated[str, typer.Argument(help='Name or folder.')]) 
 
     bundle = Bundle.load(name)
     typer.echo(f'{bundle.manifest.name}: {len(bundle.manifest.files)} files are whole')
+    if bundle.manifest.verification:
+        typer.echo('agreement with the reference when it was exported:')
+    for figure, value in bundle.manifest.verification.items():
+        typer.echo(f'  {figure:<12} {value:g}')
 
 
 def main() -> None:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 
@@ -12,6 +13,7 @@ from typer.testing import CliRunner
 
 from peace_ros import __version__
 from peace_ros.cli import app
+from peace_ros.resources import models_dir
 
 SMALL_BUNDLES = ('clip-small', 'clipseg-small')
 
@@ -34,7 +36,7 @@ def test_version_and_help() -> None:
         ('replay', '--image-topic --pose-topic --config --out --fov --altitude --every --hz'),
         ('replay', '--limit'),
         ('benchmark', '--reference --quick --json --provider --threads'),
-        ('models export', '--name --out --precision --images --licence'),
+        ('models export', '--name --out --precision --images --licence --clip --side'),
         ('models fetch', '--index --out'),
     ],
 )
@@ -82,6 +84,20 @@ def test_the_bundled_models_are_listed_shown_and_whole() -> None:
         assert name in listed
         assert 'files are whole' in peace('models', 'verify', name).output
         assert '"provenance"' in peace('models', 'info', name).output
+
+
+def test_own_bundles_are_listed_too_and_a_broken_one_is_said(tmp_path, monkeypatch) -> None:
+    own = shutil.copytree(models_dir() / SMALL_BUNDLES[0], tmp_path / 'my-own')
+    (tmp_path / 'broken').mkdir()
+    (tmp_path / 'broken' / 'manifest.json').write_text('{')
+    (tmp_path / '.cut.part').mkdir()
+    shutil.copy(own / 'manifest.json', tmp_path / '.cut.part')
+    monkeypatch.setenv('PEACE_MODELS_DIR', str(tmp_path))
+    listed = peace('models', 'list').output
+    assert 'my-own' in listed
+    assert 'broken  cannot be used' in listed
+    assert '.cut' not in listed
+    assert 'files are whole' in peace('models', 'verify', 'my-own').output
 
 
 def test_a_verb_that_is_handed_on_refuses_in_one_sentence(monkeypatch) -> None:

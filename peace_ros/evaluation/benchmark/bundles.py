@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,40 +13,81 @@ from peace_ros.evaluation.benchmark.worker import run_apart
 from peace_ros.inference import Bundle
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
-NAMES = ('clipseg-rd64-fp32', 'clipseg-rd64-int8', 'clip-vit-b-32-int8')
+NAMES = ('clipseg-rd64-fp32', 'clipseg-rd64-int8', 'clip-vit-b-32-int8', 'fastsam-s-fp32')
+FASTSAM_CLIP = 'clip-vit-b-32-int8'
+SEGMENTS = 50
+"""Planted in the segmenter's answers, because random weights find none."""
+_RECIPE = '2'
+"""Folder of the bundles; counts on when the export makes them another way."""
+_LICENCE = 'random weights, none'
 _MAKER = f'{__name__}:build_random'
 
 
-def random_bundles(folder: Path, say: Callable[[str], None]) -> dict[str, Path]:
-    """Return name -> bundle; those that are not there yet are made, each in its own process.
+def random_bundles(
+    folder: Path, say: Callable[[str], None], names: Sequence[str] = NAMES
+) -> dict[str, Path]:
+    """Return name -> bundle; those that are not there yet are made and kept.
 
     Raises BenchmarkError when the ``export`` extra is missing or a bundle cannot be made.
     """
-    bundles = {}
-    for name in NAMES:
-        bundles[name] = folder.expanduser() / name
-        try:
-            Bundle.load(bundles[name])
-        except BundleError:
-            say(f'making {name} with random weights ...')
-            run_apart(_MAKER, name=name, folder=str(bundles[name]))
+    bundles = {name: folder.expanduser() / _RECIPE / name for name in names}
+    missing = [name for name, path in bundles.items() if not _is_whole(path)]
+    # The precisions of one model are made in one process: it is drawn and loaded once.
+    for stem, group in groupby(missing, key=_stem):
+        say(f'making {stem} with random weights ...')
+        run_apart(_MAKER, names=list(group), folder=str(folder.expanduser() / _RECIPE))
     return bundles
 
 
-def build_random(name: str, folder: str) -> str:
-    """Make one of NAMES; returns how well it agrees with its reference."""
+def _is_whole(path: Path) -> bool:
+    try:
+        Bundle.load(path)
+    except BundleError:
+        return False
+    return True
+
+
+def _stem(name: str) -> str:
+    return name.rpartition('-')[0]
+
+
+def build_random(names: Sequence[str], folder: str) -> list[str]:
+    """Make some of NAMES, all of one model; returns how well each agrees with its reference."""
+    if names[0].startswith('fastsam'):
+        return [_build_fastsam(Path(folder) / name) for name in names]
     from peace_ros.inference.export.build import build_bundle  # noqa: PLC0415 - needs torch
+    from peace_ros.inference.export.pictures import draw_pictures  # noqa: PLC0415
     from peace_ros.inference.export.random_models import (  # noqa: PLC0415
         random_clip,
         random_clipseg,
     )
     from peace_ros.inference.export.sources import from_model  # noqa: PLC0415
 
-    stem, _, precision = name.rpartition('-')
+    stem = _stem(names[0])
     family = stem.split('-', maxsplit=1)[0]
-    model = random_clipseg() if family == 'clipseg' else random_clip('ViT-B/32')
-    source = from_model(stem, family, model)
-    licence = 'random weights, none'
-    return str(build_bundle(source, Path(folder), precision=precision, licence=licence))
+    source = from_model(
+        stem, family, random_clipseg() if family == 'clipseg' else random_clip('ViT-B/32')
+    )
+    found = []
+    for name in names:
+        precision = name.rpartition('-')[2]
+        frames = draw_pictures(2 if precision == 'int8' else 1)
+        agreement = build_bundle(
+            source, Path(folder) / name, precision=precision, frames=frames, licence=_LICENCE
+        )
+        found.append(str(agreement))
+    return found
+
+
+def _build_fastsam(folder: Path) -> str:
+    from peace_ros.inference.export.fastsam import export_fastsam  # noqa: PLC0415 - needs torch
+    from peace_ros.inference.export.random_fastsam import random_fastsam  # noqa: PLC0415
+    from peace_ros.inference.export.segmenters import from_network  # noqa: PLC0415
+
+    network = random_fastsam('s', planted=SEGMENTS)
+    source = from_network(
+        network, 'fastsam-s', network.side_px, licence=_LICENCE, provenance='random weights'
+    )
+    return str(export_fastsam(source, Bundle.load(folder.with_name(FASTSAM_CLIP)), folder))

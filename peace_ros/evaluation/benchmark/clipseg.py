@@ -17,7 +17,12 @@ from peace_ros.evaluation.benchmark.scene import TERMS_13, TERMS_39, draw_frames
 from peace_ros.inference import Bundle, ClipEncoder, Preprocessor, TextEncoder, open_sessions
 from peace_ros.inference.contract import IS_POSITIVE, PIXEL_VALUES, TERM_LOGITS, TEXT_EMBEDDING
 from peace_ros.prompting import PromptGenerator, PromptingParameters, load_vocabularies
-from peace_ros.segmentation import ClipSegSegmenter, SegmentationParameters, set_difference
+from peace_ros.segmentation import (
+    ClipSegSegmenter,
+    SegmentationParameters,
+    Segmenter,
+    set_difference,
+)
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -55,7 +60,7 @@ def measure_ours(**setup_values: Any) -> Measured:
         encoder, load_vocabularies(), PromptingParameters(interval_s=RANKING_INTERVAL_S, margin=0.0)
     )
     frames = draw_frames(setup.frames)
-    line = _Line(generator, segmenter)
+    line = Line(generator, segmenter)
     line.run(frames[0], Stopwatch())
     line.settle()
     generator.reset()
@@ -85,10 +90,10 @@ def measure_ours(**setup_values: Any) -> Measured:
     return Measured('peace_ros', how, spreads, len(frames), peak, busy, extra)
 
 
-class _Line:
+class Line:
     """Prompt generator and segmenter as the nodes join them: a new prompt waits for its texts."""
 
-    def __init__(self, generator: PromptGenerator, segmenter: ClipSegSegmenter) -> None:
+    def __init__(self, generator: PromptGenerator, segmenter: Segmenter) -> None:
         self._generator = generator
         self._segmenter = segmenter
         self._worker = ThreadPoolExecutor(1)
@@ -97,6 +102,7 @@ class _Line:
         self.prompts = 0
 
     def run(self, frame: Frame, watch: Stopwatch) -> None:
+        """Describe and segment a frame."""
         with watch.stage('prompt'):
             newest = self._generator.generate(frame)
         self._take(newest)

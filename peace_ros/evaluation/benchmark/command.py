@@ -11,16 +11,26 @@ from typing import Annotated, Any
 import typer
 
 from peace_ros.domain import ConfigurationError
-from peace_ros.evaluation.benchmark.bundles import random_bundles
+from peace_ros.evaluation.benchmark.bundles import NAMES, random_bundles
 from peace_ros.evaluation.benchmark.measure import Measured
-from peace_ros.evaluation.benchmark.report import clipseg_figures, describe_machine, markdown
+from peace_ros.evaluation.benchmark.report import (
+    clipseg_figures,
+    describe_machine,
+    fastsam_figures,
+    markdown,
+)
 from peace_ros.evaluation.benchmark.scene import TERMS_13
+from peace_ros.evaluation.benchmark.sweep import sweep as run_sweep
+from peace_ros.evaluation.benchmark.sweep import sweep_table
 from peace_ros.evaluation.benchmark.worker import measure_apart
+from peace_ros.inference import Bundle
 from peace_ros.inference.providers import CPU, available_providers, check_providers
 
 _CACHE = '~/.cache/peace_ros/benchmark'
 _CLIPSEG = 'peace_ros.evaluation.benchmark.clipseg'
 _REFERENCE = 'peace_ros.evaluation.benchmark.reference:measure_reference'
+_FASTSAM = 'peace_ros.evaluation.benchmark.fastsam:measure_fastsam'
+_FASTSAM_REFERENCE = 'peace_ros.evaluation.benchmark.fastsam_reference:measure_reference'
 _RANDOM = 'random'
 
 
@@ -58,8 +68,19 @@ def benchmark(
     work: Annotated[
         Path, typer.Option(metavar='DIR', help='Where random bundles are kept.')
     ] = Path(_CACHE),
+    fastsam: Annotated[
+        bool, typer.Option(help='Time FastSAM-s too, with random weights and 50 known segments.')
+    ] = True,
+    sweep: Annotated[
+        bool,
+        typer.Option(
+            '--sweep',
+            help="Only time CLIPSeg's networks over threads, precisions, providers and graph "
+            'optimisations, in fp32 and int8.',
+        ),
+    ] = False,
 ) -> None:
-    """Time CLIPSeg frame by frame, beside the ways that others run it."""
+    """Time CLIPSeg and FastSAM frame by frame, beside the ways that others run them."""
     provider = provider or _fastest()
     check_providers((provider,))
     if reference and bool(clipseg) != (source != _RANDOM):
@@ -67,7 +88,11 @@ def benchmark(
             f'--clipseg {clipseg or "(random)"} with --source {source}: the reference must have '
             'the same weights; give both or neither'
         )
-    random = random_bundles(work, typer.echo) if not (clipseg and clip) else {}
+    if sweep:
+        _sweep(clipseg, work, threads, table, json_file)
+        return
+    needed = [name for name in NAMES if fastsam or not name.startswith('fastsam')]
+    random = random_bundles(work, typer.echo, needed) if fastsam or not (clipseg and clip) else {}
     clipseg = clipseg or str(random['clipseg-rd64-int8'])
     fp32 = str(random['clipseg-rd64-fp32']) if 'int8' in clipseg and random else clipseg
     clip = clip or str(random['clip-vit-b-32-int8'])
@@ -95,10 +120,51 @@ def benchmark(
     figures = clipseg_figures(ours, memory, slow, blabberseg)
     ways = [way for way in (ours, blabberseg, slow) if way is not None]
     text = markdown(ways, figures, conditions)
+    found: dict[str, Any] = {'clipseg': figures, 'conditions': conditions}
+    if fastsam:
+        setup = {'fastsam': str(random['fastsam-s-fp32']), 'threads': threads}
+        measured = _measure_fastsam(
+            setup, clip, provider, frames=10 if quick else 20, with_reference=reference
+        )
+        found['fastsam'] = fastsam_figures(*measured)
+        ways = [way for way in measured if way is not None]
+        text += '\n' + markdown(ways, found['fastsam'], 'FastSAM-s, 50 segments, 13 terms.')
     typer.echo(text)
     table.write_text(text, encoding='utf-8')
     if json_file is not None:
-        _write_json(json_file, {'clipseg': figures, 'conditions': conditions})
+        _write_json(json_file, found)
+
+
+def _sweep(clipseg: str, work: Path, threads: int, table: Path, json_file: Path | None) -> None:
+    if clipseg:
+        bundles = {Bundle.load(clipseg).manifest.precision: clipseg}
+    else:
+        names = {each: f'clipseg-rd64-{each}' for each in ('fp32', 'int8')}
+        made = random_bundles(work, typer.echo, tuple(names.values()))
+        bundles = {precision: str(made[name]) for precision, name in names.items()}
+    conditions = describe_machine(threads, len(TERMS_13))
+    rows = run_sweep(bundles, threads, typer.echo)
+    text = sweep_table(rows, conditions)
+    typer.echo(text)
+    table.write_text(text, encoding='utf-8')
+    if json_file is not None:
+        _write_json(json_file, {'sweep': rows, 'sweep_conditions': conditions})
+
+
+def _measure_fastsam(
+    setup: dict[str, Any], clip: str, provider: str, *, frames: int, with_reference: bool
+) -> tuple[Measured, Measured | None, Measured | None]:
+    """Return what ours took, the reference, and the reference without texts."""
+    typer.echo('timing FastSAM ...')
+    ours = measure_apart(_FASTSAM, **setup, clip=clip, provider=provider, frames=frames)
+    if not with_reference:
+        return ours, None, None
+    typer.echo('timing one CLIP call per segment ...')
+    slow, images = (
+        measure_apart(_FASTSAM_REFERENCE, **setup, count=count, with_texts=with_texts)
+        for count, with_texts in ((1, True), (2, False))
+    )
+    return ours, slow, images
 
 
 def _fastest() -> str:
@@ -111,6 +177,6 @@ def _measure(name: str, **arguments: Any) -> Measured:
 
 
 def _write_json(file: Path, figures: dict[str, Any]) -> None:
-    # FastSAM's figures are written by its own measurement and kept here.
+    # What was not measured this time stays.
     kept = json.loads(file.read_text(encoding='utf-8')) if file.is_file() else {}
     file.write_text(json.dumps({**kept, **figures}, indent=2) + '\n', encoding='utf-8')

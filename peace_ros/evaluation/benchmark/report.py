@@ -58,6 +58,45 @@ def clipseg_figures(
     }
 
 
+NO_BLABBERSEG = 'BlabberSeg is a scheme for CLIPSeg; there is none of FastSAM to compare with'
+
+
+def fastsam_figures(
+    ours: Measured, reference: Measured | None, images_only: Measured | None
+) -> Figures:
+    """Return the ``fastsam`` object; figures whose measurement was not asked for are None.
+
+    Args:
+        ours: segments scored in one batch.
+        reference: one CLIP call per segment, with the texts in each.
+        images_only: the same without the texts.
+    """
+    frame = ours.stages_ms['frame']
+
+    def ratio(other: Measured | None) -> float | None:
+        return None if other is None else other.stages_ms['frame'].p50 / frame.p50
+
+    return {
+        'frame_ms_p50': frame.p50,
+        'frame_ms_p95': frame.p95,
+        'speedup_vs_reference': ratio(reference),
+        'speedup_vs_reference_without_texts': ratio(images_only),
+        'processor_time_vs_reference': (
+            None if reference is None else reference.processor_ms / ours.processor_ms
+        ),
+        'speedup_vs_blabberseg': None,
+        'speedup_vs_blabberseg_reason': NO_BLABBERSEG,
+        'cost_39_over_13_terms': ours.extra['cost_39_over_13_terms'],
+        'dynamic_prompt_share': ours.extra['dynamic_prompt_share'],
+        'peak_rss_mb': ours.peak_rss_mb,
+        'calls_per_frame': ours.extra['steady_calls'],
+        'segments_per_frame': ours.extra['segments_per_frame'],
+        'processor_ms_p50': ours.processor_ms,
+        'frames_per_s': 1e3 / frame.mean,
+        'ways': [each.as_json() for each in (ours, reference, images_only) if each is not None],
+    }
+
+
 def markdown(ways: Sequence[Measured], figures: Figures, conditions: str) -> str:
     """Return the table that is printed and saved."""
     lines = [

@@ -1,0 +1,237 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``peace evaluate``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from peace_ros.evaluation.segmentation.classes import MIXED, dataset_names
+from peace_ros.evaluation.segmentation.cores import Cores, Overrides, build_cores
+from peace_ros.evaluation.segmentation.errors import DatasetError
+from peace_ros.evaluation.segmentation.figures import Figures, figures_of, together
+from peace_ros.evaluation.segmentation.html import write_report
+from peace_ros.evaluation.segmentation.inputs import Inputs, open_source
+from peace_ros.evaluation.segmentation.progress import over_images
+from peace_ros.evaluation.segmentation.run import Outcome
+from peace_ros.evaluation.segmentation.run import evaluate as run_evaluation
+from peace_ros.evaluation.segmentation.samples import Source
+from peace_ros.evaluation.segmentation.table import figures_table, remarks_of
+from peace_ros.evaluation.segmentation.threshold import (
+    Budget,
+    choose_threshold,
+    save_threshold,
+)
+from peace_ros.evaluation.segmentation.tiles import WHOLE
+from peace_ros.segmentation import FUSIONS
+
+DEFAULT_CONFIG = 'peace_cs'
+ALL_CONFIGS = ('dd_cs', 'd_cs', 'peace_cs', 'dd_fs', 'd_fs', 'peace_fs')
+
+
+def evaluate(
+    *,
+    more_configs: Annotated[
+        list[str] | None, typer.Argument(metavar='CONFIG', help='Like --config.')
+    ] = None,
+    config: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar='PRESET',
+            help=f'Preset or file, several allowed; all: {", ".join(ALL_CONFIGS)}.',
+        ),
+    ] = None,
+    dataset: Annotated[
+        str,
+        typer.Option(metavar='NAME', help=f'One of {", ".join(dataset_names())}; needs --root.'),
+    ] = '',
+    root: Annotated[
+        Path | None, typer.Option(metavar='DIR', help='Where the dataset was unpacked.')
+    ] = None,
+    images: Annotated[
+        Path | None, typer.Option(metavar='DIR', help='Folder of images; needs --labels.')
+    ] = None,
+    labels: Annotated[
+        Path | None, typer.Option(metavar='DIR', help='Folder of label PNGs, same stems.')
+    ] = None,
+    manifest: Annotated[
+        Path | None, typer.Option(metavar='FILE', help='CSV with columns image, label, split.')
+    ] = None,
+    drawn: Annotated[int, typer.Option(metavar='N', min=0, help='Draw N scenes.')] = 0,
+    drawn_seed: Annotated[
+        int | None, typer.Option(metavar='SEED', min=0, help='First seed of the drawn scenes.')
+    ] = None,
+    classes: Annotated[
+        str,
+        typer.Option(metavar='NAME|FILE', help='Class table of --labels and --manifest.'),
+    ] = 'common',
+    split: Annotated[str, typer.Option(help='Only this split of the dataset or manifest.')] = '',
+    mixed: Annotated[
+        str,
+        typer.Option(help=f'Classes of safe and unsafe ground alike: {", ".join(MIXED)}.'),
+    ] = 'ignore',
+    limit: Annotated[
+        int | None, typer.Option(metavar='N', min=1, help='At most N images, evenly spread.')
+    ] = None,
+    tile_px: Annotated[
+        int | None,
+        typer.Option(metavar='N', min=16, help='Side of the squares; default the shorter side.'),
+    ] = None,
+    whole: Annotated[
+        bool, typer.Option('--whole', help='Whole frames, stretched as the node does it.')
+    ] = False,
+    threshold: Annotated[
+        float | None,
+        typer.Option(metavar='SCORE', help="The network's score; default: the bundle's own."),
+    ] = None,
+    fusion: Annotated[
+        str, typer.Option(help=f'In place of the presets: {", ".join(FUSIONS)}.')
+    ] = '',
+    terms: Annotated[str, typer.Option(metavar='FILE', help='Terms in place of the presets.')] = '',
+    clip: Annotated[str, typer.Option(metavar='BUNDLE', help='CLIP that ranks words.')] = '',
+    clipseg: Annotated[str, typer.Option(metavar='BUNDLE', help='CLIPSeg of *_cs.')] = '',
+    fastsam: Annotated[str, typer.Option(metavar='BUNDLE', help='FastSAM of *_fs.')] = '',
+    threads: Annotated[int, typer.Option(min=1, max=64, help='CPU threads.')] = 2,
+    no_terms: Annotated[
+        bool, typer.Option('--no-terms', help='Do not score each term by itself.')
+    ] = False,
+    strict: Annotated[
+        bool, typer.Option('--strict', help='Refuse at the first image that cannot be scored.')
+    ] = False,
+    max_false_safe: Annotated[
+        float | None,
+        typer.Option(metavar='SHARE', min=0.0, max=1.0, help='Choose a threshold that keeps it.'),
+    ] = None,
+    max_persons_safe: Annotated[
+        float | None,
+        typer.Option(metavar='SHARE', min=0.0, max=1.0, help='And this share of people.'),
+    ] = None,
+    save: Annotated[
+        bool, typer.Option('--save', help='Write the chosen threshold into the bundle.')
+    ] = False,
+    json_file: Annotated[
+        Path | None, typer.Option('--json', metavar='FILE', help='Write the figures here.')
+    ] = None,
+    html: Annotated[
+        Path | None, typer.Option(metavar='DIR', help='Write report.html with pictures here.')
+    ] = None,
+) -> None:
+    """Measure how safe what the heatmaps call safe is, on labelled images.
+
+    Give one of --dataset with --root, --images with --labels, --manifest, or --drawn.
+    """
+    console = Console()
+    if save and max_false_safe is None:
+        raise DatasetError('--save without --max-false-safe: there is no threshold to save')
+    inputs = Inputs(
+        dataset, root, images, labels, manifest, drawn, drawn_seed, classes, split, mixed, limit
+    )
+    source = open_source(inputs)
+    overrides = Overrides(clip, clipseg, fastsam, fusion, terms, '', threads)
+    configurations = _configurations([*(config or []), *(more_configs or [])], overrides, console)
+    if threshold is not None and not 0.0 < threshold < 1.0:
+        raise DatasetError(f'--threshold {threshold}: give a score between 0 and 1, both excluded')
+    side = WHOLE if whole else tile_px
+    outcome = _run(source, configurations, side, strict, not no_terms, console)
+    named = {
+        cores.name: figures_of(cores, outcome.tallies[cores.name], outcome, threshold)
+        for cores in configurations
+    }
+    console.print(f'\n[bold]{outcome.source.title}[/bold]')
+    console.print(figures_table(named))
+    for sentence in remarks_of(named, outcome):
+        console.print(sentence, highlight=False, soft_wrap=True)
+    try:
+        if max_false_safe is not None:
+            budget = Budget(max_false_safe, max_persons_safe)
+            _choose(configurations, outcome, budget, named, console, save=save)
+    finally:
+        # What was measured is kept, also when no threshold keeps the budget.
+        _write(named, outcome, configurations, side, json_file, html, console)
+
+
+def _configurations(names: list[str], overrides: Overrides, console: Console) -> list[Cores]:
+    wanted = [each for name in names for each in name.split(',') if each] or [DEFAULT_CONFIG]
+    if wanted == ['all']:
+        wanted = list(ALL_CONFIGS)
+    found: dict[str, Cores] = {}
+    for name in wanted:
+        cores = build_cores(name, overrides)
+        if isinstance(cores, str):
+            console.print(cores, highlight=False, soft_wrap=True)
+        else:
+            found[cores.name] = cores
+    if not found:
+        raise DatasetError('no configuration is left to evaluate: give the bundles that they lack')
+    return list(found.values())
+
+
+def _run(
+    source: Source,
+    configurations: list[Cores],
+    tile_px: int | None,
+    strict: bool,
+    score_terms: bool,
+    console: Console,
+) -> Outcome:
+    with over_images(console, len(source.samples)) as report:
+        return run_evaluation(
+            source,
+            configurations,
+            tile_px=tile_px,
+            strict=strict,
+            score_terms=score_terms,
+            report=report,
+        )
+
+
+def _choose(
+    configurations: list[Cores],
+    outcome: Outcome,
+    budget: Budget,
+    named: dict[str, Figures],
+    console: Console,
+    *,
+    save: bool,
+) -> None:
+    if save and len(configurations) > 1:
+        raise DatasetError('--save with several configurations: give the one whose bundle it is')
+    for cores in configurations:
+        choice = choose_threshold(cores, outcome.tallies[cores.name], budget)
+        named[cores.name]['choice'] = {**asdict(choice), 'max_false_safe': budget.false_safe}
+        console.print(
+            f'{cores.name}: threshold {choice.threshold:.4f} keeps false-safe at '
+            f'{choice.false_safe:.2%} (up to {choice.false_safe_limit:.2%}), recall '
+            f'{choice.recall:.2%}, mIoU {choice.miou:.2%}',
+            highlight=False,
+            soft_wrap=True,
+        )
+        if save:
+            console.print(f'saved in {save_threshold(cores, choice, budget)}', soft_wrap=True)
+
+
+def _write(
+    named: dict[str, Figures],
+    outcome: Outcome,
+    configurations: list[Cores],
+    tile_px: int | None,
+    json_file: Path | None,
+    html: Path | None,
+    console: Console,
+) -> None:
+    figures: dict[str, Any] = together(named, outcome)
+    try:
+        if json_file is not None:
+            json_file.parent.mkdir(parents=True, exist_ok=True)
+            json_file.write_text(json.dumps(figures, indent=2) + '\n', encoding='utf-8')
+        if html is not None:
+            report = write_report(html, named, outcome, configurations, tile_px)
+            console.print(f'report: {report}', soft_wrap=True)
+    except OSError as error:
+        raise DatasetError(f'{error.filename} cannot be written: {error.strerror}') from error
