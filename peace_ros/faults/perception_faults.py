@@ -1,0 +1,418 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Faults of camera, prompt, model, heatmap and of the world below."""
+
+from __future__ import annotations
+
+from peace_ros.faults import tamper
+from peace_ros.faults.fault import (
+    GOING,
+    LOOKING_AGAIN,
+    UNDER_WAY,
+    Expected,
+    Fault,
+    Injection,
+    Moment,
+    Setting,
+)
+from peace_ros.faults.injections import (
+    BadBundle,
+    BadModel,
+    Killed,
+    Person,
+    always,
+    camera,
+    every_s,
+    heatmap,
+    prompt,
+)
+from peace_ros.landing import State
+
+_HOLD = State.HOLD.value
+_LANDING = State.LANDING.value
+_HANDOVER = State.HANDOVER.value
+_STOPS = (_HOLD, *LOOKING_AGAIN)
+"""The descent ends, whether the landing calls it missing data or a lost site."""
+
+NO_NEW_HEATMAP = Expected(
+    reaches=(_HOLD,),
+    within_s=2.5,
+    still_within_s=3.5,
+    zero_within_s=2.8,
+    recovers=UNDER_WAY,
+    recovers_within_s=12.0,
+)
+"""No heatmap can be used any more: the descent ends at 1.5 s, HOLD follows at 2 s."""
+
+UNSAFE_HEATMAPS = Expected(
+    reaches=_STOPS,
+    within_s=2.5,
+    still_within_s=4.0,
+    recovers=GOING,
+    recovers_within_s=40.0,
+)
+"""Heatmaps come and call the ground unsafe, or cannot be believed."""
+
+GOES_ON = Expected(reaches=(_HANDOVER,), within_s=45.0, allowed=GOING)
+"""The landing is not disturbed."""
+
+_UNTIL_HANDOVER_S = 46.0
+_WITH_PROMPTS = Setting(prompts=True)
+
+
+def _camera(name: str, title: str, injection: Injection, behaviour: str) -> Fault:
+    return Fault(name, 'camera', title, injection, NO_NEW_HEATMAP, behaviour)
+
+
+CAMERA = (
+    _camera(
+        'camera_stops',
+        'The camera stops.',
+        camera(always(tamper.nothing)),
+        'Descends no more when the newest heatmap is 1.5 s old, HOLD at 2 s; goes on when '
+        'pictures come again.',
+    ),
+    _camera(
+        'camera_freezes',
+        'The driver repeats the last picture with its old stamp.',
+        camera(lambda: tamper.frozen(new_stamps=False)),
+        'A stamp that is not newer than the last is refused: as if the camera had stopped.',
+    ),
+    Fault(
+        'camera_freezes_restamped',
+        'camera',
+        'The driver repeats the last picture with new stamps.',
+        camera(lambda: tamper.frozen(new_stamps=True)),
+        NO_NEW_HEATMAP,
+        'The same picture from elsewhere is refused: as if the camera had stopped.',
+    ),
+    Fault(
+        'camera_black',
+        'camera',
+        'The picture is black.',
+        camera(lambda: tamper.filled(0)),
+        UNSAFE_HEATMAPS,
+        'Nothing safe can be seen: the site is lost or the data are missing; no descent.',
+    ),
+    Fault(
+        'camera_saturates',
+        'camera',
+        'The picture is white.',
+        camera(lambda: tamper.filled(255)),
+        UNSAFE_HEATMAPS,
+        'Nothing can be seen: the site is lost or the data are missing; no descent.',
+    ),
+    Fault(
+        'camera_noise',
+        'camera',
+        'Every pixel is chance.',
+        camera(tamper.noisy),
+        UNSAFE_HEATMAPS,
+        'Noise is nothing safe: the site is lost; no descent.',
+    ),
+    _camera(
+        'camera_cut_short',
+        'Half of the bytes of each picture are missing.',
+        camera(always(tamper.cut_short)),
+        'The picture is refused with a sentence: as if the camera had stopped.',
+    ),
+    _camera(
+        'camera_encoding',
+        'The pictures claim an encoding that does not exist.',
+        camera(lambda: tamper.of_encoding('rgb99')),
+        'The picture is refused with a sentence: as if the camera had stopped.',
+    ),
+    Fault(
+        'camera_half_size',
+        'camera',
+        'The pictures shrink to half of their size, with the same field of view.',
+        camera(lambda: tamper.resized(176, 176)),
+        GOES_ON,
+        'The field of view is what counts: goes on.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+    ),
+    Fault(
+        'camera_other_shape',
+        'camera',
+        'The pictures jump to another shape, 352 x 176, cut out of the middle.',
+        camera(lambda: tamper.resized(352, 176)),
+        NO_NEW_HEATMAP,
+        'A picture of another shape than that of the camera cannot be projected and is refused.',
+    ),
+    _camera(
+        'stamp_future',
+        'Stamps lie 10 s in the future.',
+        camera(lambda: tamper.shifted(10.0)),
+        'Stamps ahead of the clock are refused: as if the camera had stopped.',
+    ),
+    _camera(
+        'stamp_past',
+        'Stamps lie 5 s in the past.',
+        camera(lambda: tamper.shifted(-5.0)),
+        'Stamps older than the last are refused: as if the camera had stopped.',
+    ),
+    _camera(
+        'stamp_backwards',
+        'Stamps run backwards.',
+        camera(tamper.running_back),
+        'Stamps older than the last are refused: as if the camera had stopped.',
+    ),
+    _camera(
+        'stamp_equal',
+        'All stamps are equal.',
+        camera(tamper.equal_stamps),
+        'A stamp that is not newer than the last is refused: as if the camera had stopped.',
+    ),
+    _camera(
+        'stamp_zero',
+        'The driver forgets its stamps: all are zero.',
+        camera(lambda: tamper.shifted(-4e9)),
+        'Stamps older than the last are refused: as if the camera had stopped.',
+    ),
+    _camera(
+        'camera_late',
+        'Pictures come 3 s after they were taken.',
+        camera(lambda: tamper.late(3.0)),
+        'Each heatmap is too old when it comes: HOLD.',
+    ),
+)
+
+PROMPT = (
+    Fault(
+        'prompt_missing',
+        'prompt',
+        'The prompt generator is killed.',
+        Killed('prompt_generator'),
+        GOES_ON,
+        'The last prompt is used, and said to be old: goes on.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+        setting=_WITH_PROMPTS,
+    ),
+    Fault(
+        'prompt_late',
+        'prompt',
+        'Prompts come 3 s late.',
+        prompt(lambda: tamper.late(3.0)),
+        GOES_ON,
+        'Each frame waits 0.3 s for its prompt, then the newest one is used: goes on.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+        setting=_WITH_PROMPTS,
+    ),
+    Fault(
+        'prompt_without_term',
+        'prompt',
+        'Prompts have no place for the term.',
+        prompt(always(tamper.without_term)),
+        GOES_ON,
+        'The prompt is refused with a sentence and the last good one is used: goes on.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+        setting=_WITH_PROMPTS,
+    ),
+)
+
+MODEL = (
+    Fault(
+        'model_slow',
+        'model',
+        'The model takes 3.3 s for a frame (0.3 Hz).',
+        BadModel('slow 3.3'),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=2.5,
+            zero_within_s=None,
+            recovers=UNDER_WAY,
+            recovers_within_s=15.0,
+        ),
+        'HOLD whenever the newest heatmap is older than 2 s; never descends on such a map.',
+        lasts_s=12.0,
+    ),
+    Fault(
+        'model_throws',
+        'model',
+        'The network gives an error for each frame.',
+        BadModel('throws'),
+        NO_NEW_HEATMAP,
+        'The node says so and goes on with the next frame; without heatmaps HOLD.',
+    ),
+    Fault(
+        'model_breaks',
+        'model',
+        'A defect ends the segmentation node; it is started again.',
+        BadModel('breaks', revive=True),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=2.5,
+            still_within_s=3.5,
+            zero_within_s=2.8,
+            recovers=UNDER_WAY,
+            recovers_within_s=25.0,
+            ends_processes=('segmentation',),
+        ),
+        'The node ends with a traceback instead of going on silently; HOLD until it is back.',
+    ),
+    Fault(
+        'model_nan',
+        'model',
+        'The segmentation is started again with weights that are no numbers.',
+        BadBundle(honest=True),
+        Expected(
+            reaches=_STOPS,
+            within_s=2.5,
+            still_within_s=4.0,
+            recovers=UNDER_WAY,
+            recovers_within_s=25.0,
+        ),
+        'Scores that are no numbers are refused: no heatmap, HOLD.',
+        lasts_s=10.0,
+    ),
+    Fault(
+        'bundle_damaged',
+        'model',
+        'The segmentation is started again with a bundle whose checksum is wrong.',
+        BadBundle(honest=False),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=2.5,
+            still_within_s=3.5,
+            recovers=UNDER_WAY,
+            recovers_within_s=25.0,
+            ends_processes=('segmentation',),
+        ),
+        'The node refuses to start and names the file; HOLD.',
+        lasts_s=10.0,
+    ),
+)
+
+HEATMAP = (
+    Fault(
+        'heatmap_stops',
+        'heatmap',
+        'Heatmaps get lost on the way to the landing node.',
+        heatmap(always(tamper.nothing)),
+        NO_NEW_HEATMAP,
+        'As if the camera had stopped.',
+    ),
+    Fault(
+        'heatmap_rare',
+        'heatmap',
+        'One heatmap comes every 3.3 s.',
+        heatmap(every_s(3.3)),
+        Expected(reaches=(_HOLD,), within_s=5.5, recovers=UNDER_WAY, recovers_within_s=15.0),
+        'HOLD whenever the newest one is older than 2 s.',
+        lasts_s=10.0,
+    ),
+    Fault(
+        'heatmap_all_safe',
+        'heatmap',
+        'Every pixel is called surely safe, over safe ground.',
+        heatmap(lambda: tamper.filled(255)),
+        Expected(),
+        'A picture without any contrast is not believed; over ground that is truly safe nothing '
+        'else could be noticed.',
+        lasts_s=15.0,
+    ),
+    Fault(
+        'heatmap_all_safe_over_roofs',
+        'heatmap',
+        'Every pixel is called surely safe, over buildings, while a site is sought.',
+        heatmap(lambda: tamper.filled(255)),
+        Expected(
+            reaches=(_HOLD, State.SEARCHING.value),
+            within_s=3.0,
+            allowed=(State.SEARCHING.value, _HOLD, State.RESTARTING.value),
+        ),
+        'A heatmap without any contrast is not believed: no site is chosen on it.',
+        at=Moment(State.SEARCHING.value),
+        lasts_s=20.0,
+        setting=Setting(world='roofs'),
+    ),
+    Fault(
+        'heatmap_all_unsafe',
+        'heatmap',
+        'Every pixel is called unsafe.',
+        heatmap(lambda: tamper.filled(0)),
+        UNSAFE_HEATMAPS,
+        'The site is lost: WAITING, then CLIMBING to look for another.',
+        lasts_s=8.0,
+    ),
+    Fault(
+        'heatmap_flickers',
+        'heatmap',
+        'Heatmaps are all safe and all unsafe in turn.',
+        heatmap(tamper.flickering),
+        UNSAFE_HEATMAPS,
+        'Unsafe is believed sooner and remembered longer than safe: the site is lost.',
+        lasts_s=8.0,
+    ),
+    Fault(
+        'heatmap_encoding',
+        'heatmap',
+        'Heatmaps come in another encoding.',
+        heatmap(lambda: tamper.of_encoding('rgb8')),
+        NO_NEW_HEATMAP,
+        'They are refused with a sentence: as if the camera had stopped.',
+    ),
+    Fault(
+        'heatmap_cut_short',
+        'heatmap',
+        'Half of the bytes of each heatmap are missing.',
+        heatmap(always(tamper.cut_short)),
+        NO_NEW_HEATMAP,
+        'They are refused with a sentence: as if the camera had stopped.',
+    ),
+    Fault(
+        'heatmap_late',
+        'heatmap',
+        'Heatmaps come 3 s late.',
+        heatmap(lambda: tamper.late(3.0)),
+        NO_NEW_HEATMAP,
+        'Each is too old when it comes: HOLD.',
+    ),
+)
+
+WORLD = (
+    Fault(
+        'person_seen_at_30_m',
+        'world',
+        'At 30 m a person walks to the place below and stays; the model sees them.',
+        Person(seen=True),
+        Expected(reaches=_STOPS, within_s=5.0, still_within_s=7.0),
+        'The ground is unsafe at once: the site is lost, WAITING, then CLIMBING; the place is '
+        'remembered as failed.',
+        at=Moment(below_m=30.0),
+        lasts_s=12.0,
+        note='The heatmap around the person is darkened, whatever the model sees.',
+    ),
+    Fault(
+        'person_painted_at_30_m',
+        'world',
+        'At 30 m a person walks to the place below and stays, painted into the picture.',
+        Person(seen=False),
+        Expected(reaches=_STOPS, within_s=6.0, still_within_s=8.0),
+        'As before, as far as the model sees a person of four pixels (at 30 m).',
+        at=Moment(below_m=30.0),
+        lasts_s=14.0,
+    ),
+    Fault(
+        'every_site_occupied',
+        'world',
+        'A car stands every few metres on all open ground.',
+        camera(always(tamper.untouched)),
+        Expected(
+            reaches=LOOKING_AGAIN,
+            within_s=1.0,
+            allowed=(*LOOKING_AGAIN, _HOLD, State.AIMING.value),
+        ),
+        'There is no safe place: it searches on and does not descend.',
+        at=Moment(State.SEARCHING.value),
+        lasts_s=25.0,
+        setting=Setting(world='crowded'),
+    ),
+)
+
+FAULTS = (*CAMERA, *PROMPT, *MODEL, *HEATMAP, *WORLD)
+"""In the order of the documentation."""

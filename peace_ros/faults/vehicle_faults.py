@@ -1,0 +1,626 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Faults of telemetry, line, autopilot, processes and clocks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from peace_ros.faults import line
+from peace_ros.faults.fault import (
+    GOING,
+    LOOKING_AGAIN,
+    UNDER_WAY,
+    Expected,
+    Fault,
+    Moment,
+    Setting,
+)
+from peace_ros.faults.injections import (
+    Autopilot,
+    BadLine,
+    ClockStep,
+    ForgedTelemetry,
+    FullDisk,
+    Killed,
+    SecondCompanion,
+    Stalled,
+    Suspended,
+    both_ways,
+)
+from peace_ros.faults.perception_faults import GOES_ON, NO_NEW_HEATMAP
+from peace_ros.landing import State
+
+_IDLE = State.IDLE.value
+_HOLD = State.HOLD.value
+_ABORTED = State.ABORTED.value
+_UNTIL_HANDOVER_S = 46.0
+_LATER_S = 15.0
+_HOVER_S = 5.5
+"""The autopilot forgets a set-point after 3 s and then brakes."""
+
+NO_POSITION = Expected(
+    reaches=(_HOLD,),
+    within_s=1.6,
+    still_within_s=3.0,
+    zero_within_s=1.9,
+    recovers=UNDER_WAY,
+    recovers_within_s=_LATER_S,
+)
+"""A pose that is not renewed for 1 s, or cannot be believed, is none."""
+
+NOT_BELIEVED = Expected(
+    reaches=(_HOLD, *LOOKING_AGAIN),
+    within_s=1.6,
+    still_within_s=3.0,
+    recovers=GOING,
+    recovers_within_s=40.0,
+)
+
+JUMPED = Expected(
+    reaches=(_HOLD,),
+    within_s=1.6,
+    still_within_s=3.0,
+    allowed=(State.LANDING.value, _HOLD),
+    recovers=GOING,
+    recovers_within_s=40.0,
+)
+
+TAKEN_OVER = Expected(
+    reaches=(_ABORTED,), within_s=0.5, silent_within_s=0.5, stays=_ABORTED, flies=False
+)
+"""Somebody else flies: no set-point any more, until a person engages again."""
+
+TELEMETRY = (
+    Fault(
+        'telemetry_stops',
+        'telemetry',
+        'The autopilot says nothing for 2 s.',
+        Autopilot('telemetry_stop', undo='telemetry_resume'),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=1.1,
+            still_within_s=2.5,
+            zero_within_s=1.4,
+            recovers=UNDER_WAY,
+            recovers_within_s=_LATER_S,
+        ),
+        'HOLD when the newest telemetry is 0.7 s old; goes on when it comes again.',
+        lasts_s=2.5,
+    ),
+    Fault(
+        'position_stops',
+        'telemetry',
+        'LOCAL_POSITION_NED stops, everything else goes on.',
+        Autopilot('telemetry_stop', {'messages': ['LOCAL_POSITION_NED']}, undo='telemetry_resume'),
+        NO_POSITION,
+        'A pose older than 1 s is none: HOLD.',
+    ),
+    Fault(
+        'attitude_stops',
+        'telemetry',
+        'ATTITUDE stops, everything else goes on.',
+        Autopilot('telemetry_stop', {'messages': ['ATTITUDE']}, undo='telemetry_resume'),
+        NO_POSITION,
+        'Without attitude there is no pose: HOLD.',
+    ),
+    Fault(
+        'heartbeat_stops',
+        'telemetry',
+        'HEARTBEAT stops, everything else goes on.',
+        Autopilot('telemetry_stop', {'messages': ['HEARTBEAT']}, undo='telemetry_resume'),
+        Expected(reaches=(_HOLD, _ABORTED), within_s=4.5, still_within_s=6.5, zero_within_s=5.0),
+        'After 3.5 s without HEARTBEAT nobody knows who flies: no set-points.',
+        lasts_s=8.0,
+    ),
+    Fault(
+        'altitude_nan',
+        'telemetry',
+        'The reported altitude is no number.',
+        Autopilot('altitude', {'kind': 'nan'}),
+        NO_POSITION,
+        'Such a position is refused, so the pose grows old: HOLD.',
+    ),
+    Fault(
+        'altitude_jumps_up',
+        'telemetry',
+        'The reported altitude jumps up by 30 m, and stays there for 12 s.',
+        Autopilot('altitude', {'kind': 'jump', 'offset_m': 30.0}),
+        JUMPED,
+        'A position that no flight explains is not believed until it comes back: HOLD.',
+        lasts_s=12.0,
+    ),
+    Fault(
+        'altitude_jumps_down',
+        'telemetry',
+        'The reported altitude jumps down by 15 m, and stays there for 12 s.',
+        Autopilot('altitude', {'kind': 'jump', 'offset_m': -15.0}),
+        JUMPED,
+        'A position that no flight explains is not believed until it comes back: HOLD.',
+        lasts_s=12.0,
+    ),
+    Fault(
+        'altitude_sign',
+        'telemetry',
+        'The reported altitude has the wrong sign.',
+        Autopilot('altitude', {'kind': 'sign'}),
+        NO_POSITION,
+        'An altitude below the ground is not valid: HOLD.',
+    ),
+    Fault(
+        'altitude_freezes',
+        'telemetry',
+        'The reported altitude does not change any more.',
+        Autopilot('altitude', {'kind': 'freeze'}),
+        Expected(reaches=(_HOLD,), within_s=4.5, still_within_s=6.0, stays=_HOLD),
+        'Told to sink, it does not report that it does: HOLD, until a person engages again.',
+        lasts_s=12.0,
+    ),
+    Fault(
+        'position_jumps',
+        'telemetry',
+        'The reported position jumps by 20 m to the north.',
+        Autopilot('position', {'north_m': 20.0}),
+        NOT_BELIEVED,
+        'A position that no flight explains is not believed until it comes back: HOLD.',
+    ),
+    Fault(
+        'frame_enu',
+        'telemetry',
+        'LOCAL_POSITION_NED comes in ENU.',
+        Autopilot('frame', {'kind': 'enu'}),
+        NO_POSITION,
+        'An altitude below the ground is not valid: HOLD.',
+    ),
+    Fault(
+        'frame_south',
+        'telemetry',
+        'LOCAL_POSITION_NED comes with x and y negated.',
+        Autopilot('frame', {'kind': 'south'}),
+        Expected(),
+        'Near the origin nothing shows; farther away the position jumps and is not believed.',
+        lasts_s=12.0,
+    ),
+)
+
+_SIGNED = Setting(signed=True)
+
+LINE = (
+    Fault(
+        'line_lost_1_s',
+        'line',
+        'Nothing passes between companion and autopilot for 1 s.',
+        both_ways(lambda: line.nothing),
+        Expected(reaches=(_HOLD,), within_s=1.1, recovers=UNDER_WAY, recovers_within_s=_LATER_S),
+        'HOLD when the newest telemetry is 0.7 s old; goes on afterwards.',
+        lasts_s=1.2,
+    ),
+    Fault(
+        'line_lost_5_s',
+        'line',
+        'Nothing passes for 5 s.',
+        both_ways(lambda: line.nothing),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=1.1,
+            allowed=(*GOING, _HOLD, _ABORTED),
+            still_within_s=5.0,
+            recovers=(*GOING, _ABORTED),
+            recovers_within_s=_LATER_S,
+        ),
+        'HOLD; the autopilot stops by itself 3 s after the last set-point.',
+        lasts_s=5.5,
+    ),
+    Fault(
+        'line_lost_60_s',
+        'line',
+        'Nothing passes for 60 s.',
+        both_ways(lambda: line.nothing),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=1.1,
+            allowed=(*GOING, _HOLD, _ABORTED),
+            still_within_s=5.0,
+            recovers=(*GOING, _ABORTED),
+            recovers_within_s=_LATER_S,
+        ),
+        'As 5 s.',
+        lasts_s=60.0,
+    ),
+    Fault(
+        'line_down_lost',
+        'line',
+        'The companion is heard, but hears nothing for 3 s.',
+        BadLine(down=lambda: line.nothing),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=1.1,
+            still_within_s=2.6,
+            zero_within_s=1.4,
+            recovers=UNDER_WAY,
+            recovers_within_s=_LATER_S,
+        ),
+        'HOLD when the newest telemetry is 0.7 s old, and zero goes out.',
+        lasts_s=3.0,
+    ),
+    Fault(
+        'line_up_lost',
+        'line',
+        'The companion hears, but is not heard for 6 s.',
+        BadLine(up=lambda: line.nothing),
+        Expected(reaches=(_HOLD,), within_s=7.0, still_within_s=5.0, stays=_HOLD),
+        'The autopilot stops by itself 3 s after the last set-point. Told to sink, it reports that '
+        'it does not: HOLD, until a person engages again.',
+        lasts_s=8.0,
+    ),
+    Fault(
+        'line_doubles',
+        'line',
+        'Every datagram comes twice.',
+        both_ways(lambda: line.doubled),
+        GOES_ON,
+        'Goes on.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+    ),
+    Fault(
+        'line_shuffles',
+        'line',
+        'Every second datagram is overtaken by those behind it.',
+        both_ways(lambda: line.shuffled(0.08)),
+        GOES_ON,
+        'Goes on.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+    ),
+    Fault(
+        'line_damages',
+        'line',
+        'A bit is wrong in every fourth datagram.',
+        both_ways(lambda: line.damaged(4)),
+        GOES_ON,
+        'Damaged messages fail their checksum and are dropped: goes on.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+    ),
+    Fault(
+        'line_slow',
+        'line',
+        'Every datagram takes 0.3 s longer.',
+        both_ways(lambda: line.late(0.3)),
+        Expected(),
+        'Poses are stamped late; the map is blurred by what the vehicle moves in that time.',
+        lasts_s=15.0,
+    ),
+    Fault(
+        'second_companion_mode',
+        'line',
+        'A second companion sends the autopilot to LOITER.',
+        SecondCompanion(
+            lambda: mavlink.MAVLink_command_long_message(
+                1, 1, mavlink.MAV_CMD_DO_SET_MODE, 0, 1.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            ),
+            0.0,
+        ),
+        TAKEN_OVER,
+        'A mode that we did not ask for is a take-over: ABORTED, whoever asked.',
+    ),
+    Fault(
+        'second_companion_setpoints',
+        'line',
+        'A second companion sends set-points of 2 m/s downwards, without the key of the line.',
+        SecondCompanion(lambda: _setpoint(2.0), 30.0),
+        GOES_ON,
+        'With signing the autopilot obeys nobody else: goes on. Without signing nothing can help.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+        setting=_SIGNED,
+    ),
+    Fault(
+        'forged_telemetry_same_address',
+        'line',
+        "Positions in the autopilot's name come from its own address, without the key of the line.",
+        ForgedTelemetry(lambda: [_forged_position()], from_elsewhere=False),
+        GOES_ON,
+        'With signing nothing else is believed: goes on.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+        setting=_SIGNED,
+    ),
+    Fault(
+        'forged_telemetry',
+        'line',
+        'Somebody sends the companion positions in the name of the autopilot from elsewhere.',
+        ForgedTelemetry(lambda: [_forged_position()]),
+        GOES_ON,
+        'Only the address is believed that the autopilot has: goes on.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+    ),
+)
+
+
+def _setpoint(v_down_m_s: float) -> Any:
+    velocity_only = 0x5C7
+    return mavlink.MAVLink_set_position_target_local_ned_message(
+        *(0, 1, 1, mavlink.MAV_FRAME_LOCAL_NED, velocity_only),
+        *(0.0, 0.0, 0.0),
+        *(0.0, 0.0, v_down_m_s),
+        *(0.0, 0.0, 0.0, 0.0, 0.0),
+    )
+
+
+def _forged_position() -> bytes:
+    codec = mavlink.MAVLink(None, 1, mavlink.MAV_COMP_ID_AUTOPILOT1)
+    message = mavlink.MAVLink_local_position_ned_message(1_000_000, 0.0, 0.0, -90.0, 0.0, 0.0, 0.0)
+    return bytes(message.pack(codec))
+
+
+def _pilot(name: str, state: State, mode: str) -> Fault:
+    return Fault(
+        name,
+        'autopilot',
+        f'The pilot moves the switch to {mode} in {state.value}.',
+        Autopilot('pilot_mode', {'mode': mode}, undo=''),
+        TAKEN_OVER,
+        'ABORTED at once; no set-point until a person engages again.',
+        at=Moment(state.value),
+        lasts_s=3.0,
+    )
+
+
+AUTOPILOT = (
+    _pilot('pilot_takes_over_searching', State.SEARCHING, 'LOITER'),
+    _pilot('pilot_takes_over_landing', State.LANDING, 'LOITER'),
+    _pilot('pilot_lands', State.LANDING, 'LAND'),
+    Fault(
+        'pilot_takes_over_and_gives_back',
+        'autopilot',
+        'The pilot moves the switch to LOITER and 2 s later back to GUIDED.',
+        Autopilot(
+            'pilot_mode', {'mode': 'LOITER'}, undo='pilot_mode', undo_arguments={'mode': 'GUIDED'}
+        ),
+        TAKEN_OVER,
+        'ABORTED for good: GUIDED alone is no order to land.',
+        lasts_s=2.0,
+    ),
+    Fault(
+        'autopilot_reboots',
+        'autopilot',
+        'The autopilot restarts in flight and comes up in another mode.',
+        Autopilot('reboot', undo=''),
+        Expected(reaches=(_ABORTED, _HOLD), within_s=1.6, silent_within_s=1.9, flies=False),
+        'Another mode is a take-over; without a position it holds.',
+    ),
+    Fault(
+        'autopilot_refuses',
+        'autopilot',
+        'The autopilot refuses GUIDED when the landing is engaged.',
+        Autopilot('refuse', {'modes': ['GUIDED']}),
+        Expected(refuses=True, silent_within_s=0.0),
+        "The engagement fails with the autopilot's own words; nothing is sent.",
+        at=Moment(_IDLE),
+        lasts_s=1.0,
+    ),
+    Fault(
+        'gnss_lost',
+        'autopilot',
+        'GNSS is lost; the position stops.',
+        Autopilot('gps_loss', undo='gps_restore'),
+        Expected(reaches=(_HOLD,), within_s=1.6, still_within_s=3.5, zero_within_s=1.9),
+        'HOLD; 7.4 s later the failsafe of the autopilot lands: ABORTED.',
+        lasts_s=6.0,
+    ),
+    Fault(
+        'gnss_lost_position_stale',
+        'autopilot',
+        'GNSS is lost; the autopilot repeats the last position.',
+        Autopilot('gps_loss', {'stale': True}, undo='gps_restore'),
+        Expected(reaches=(_HOLD,), within_s=4.5, still_within_s=5.5),
+        'The speed and the position that are reported disagree: HOLD.',
+        lasts_s=6.5,
+    ),
+    Fault(
+        'radio_lost',
+        'autopilot',
+        "The pilot's radio is lost: the autopilot goes to RTL.",
+        Autopilot('radio_loss', undo=''),
+        TAKEN_OVER,
+        'A failsafe outranks us: ABORTED.',
+        lasts_s=3.0,
+    ),
+    Fault(
+        'disarmed',
+        'autopilot',
+        'The motors are stopped in flight.',
+        Autopilot('disarm', undo=''),
+        Expected(reaches=(_ABORTED, _HOLD), within_s=1.6, silent_within_s=1.9, flies=False),
+        'Disarmed is a take-over: ABORTED.',
+        lasts_s=3.0,
+    ),
+    Fault(
+        'wind_10_m_s',
+        'autopilot',
+        'Wind of 10 m/s with gusts of 2 m/s rises while it descends.',
+        Autopilot('wind', {'to_north_m_s': 8.0, 'to_east_m_s': 6.0, 'gust_m_s': 2.0}),
+        Expected(reaches=(State.HANDOVER.value,), within_s=70.0),
+        'The autopilot leans into it, lateral correction goes on, and the hand-over is safe.',
+        lasts_s=72.0,
+        until_reached=True,
+    ),
+)
+
+_RESTARTED = Expected(
+    still_within_s=_HOVER_S,
+    silent_within_s=0.2,
+    recovers=(_IDLE,),
+    recovers_within_s=8.0,
+    stays=_IDLE,
+)
+
+
+def _killed(state: State) -> Fault:
+    return Fault(
+        f'landing_killed_{state.value.lower()}',
+        'process',
+        f'The landing node is killed in {state.value} and started again.',
+        Killed('landing'),
+        _RESTARTED,
+        'The autopilot stops by itself 3 s after the last set-point; the new node is IDLE and '
+        'moves nothing until a person engages.',
+        at=Moment(state.value),
+        lasts_s=7.0,
+    )
+
+
+PROCESS = (
+    _killed(State.SEARCHING),
+    _killed(State.AIMING),
+    _killed(State.LANDING),
+    _killed(State.HANDOVER),
+    Fault(
+        'segmentation_killed',
+        'process',
+        'The segmentation node is killed and started again.',
+        Killed('segmentation'),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=2.5,
+            still_within_s=3.5,
+            zero_within_s=2.8,
+            recovers=UNDER_WAY,
+            recovers_within_s=25.0,
+        ),
+        'HOLD; goes on when heatmaps come again.',
+    ),
+    Fault(
+        'segmentation_killed_searching',
+        'process',
+        'The segmentation node is killed in SEARCHING and started again.',
+        Killed('segmentation'),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=2.5,
+            zero_within_s=2.8,
+            recovers=UNDER_WAY,
+            recovers_within_s=25.0,
+        ),
+        'HOLD; goes on when heatmaps come again.',
+        at=Moment(State.SEARCHING.value),
+    ),
+    Fault(
+        'camera_killed',
+        'process',
+        'The camera node is killed and started again.',
+        Killed('satellite_view'),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=2.5,
+            still_within_s=3.5,
+            zero_within_s=2.8,
+            recovers=UNDER_WAY,
+            recovers_within_s=25.0,
+        ),
+        'HOLD; goes on when pictures come again.',
+    ),
+    Fault(
+        'segmentation_stands_still',
+        'process',
+        'The segmentation process does not get the processor for 5 s.',
+        Suspended('segmentation'),
+        NO_NEW_HEATMAP,
+        'HOLD; goes on afterwards.',
+    ),
+    Fault(
+        'landing_stands_still',
+        'process',
+        'The landing process does not get the processor for 6 s.',
+        Suspended('landing'),
+        Expected(
+            still_within_s=_HOVER_S, recovers=(_HOLD, _ABORTED, *GOING), recovers_within_s=5.0
+        ),
+        'The autopilot stops by itself 3 s after the last set-point; awake again, the landing '
+        'looks at the age of its data before it moves, and its dead-man may have handed over: '
+        'ABORTED.',
+        lasts_s=6.5,
+    ),
+    Fault(
+        'executor_stalls',
+        'process',
+        'A callback keeps the executor of the landing node for 2 s.',
+        Stalled(2.0),
+        Expected(
+            zero_within_s=0.75,
+            still_within_s=2.0,
+            recovers=(_HOLD, *GOING),
+            recovers_within_s=5.0,
+        ),
+        'The sender has a thread of its own: its dead-man sends zero 0.5 s after the last '
+        'decision; goes on afterwards.',
+        lasts_s=1.9,
+    ),
+    Fault(
+        'executor_stalls_for_long',
+        'process',
+        'A callback keeps the executor of the landing node for 5 s.',
+        Stalled(5.0),
+        Expected(
+            zero_within_s=0.75,
+            still_within_s=2.0,
+            recovers=(_ABORTED,),
+            recovers_within_s=3.0,
+            stays=_ABORTED,
+        ),
+        "2.5 s after the last decision the dead-man asks for the autopilot's own hold mode; "
+        'afterwards ABORTED, until a person engages again.',
+        lasts_s=5.0,
+    ),
+    Fault(
+        'disk_full',
+        'process',
+        "The recorder's disk is full.",
+        FullDisk(),
+        Expected(
+            reaches=(State.HANDOVER.value,),
+            within_s=45.0,
+            allowed=GOING,
+            ends_processes=('recorder',),
+        ),
+        'The recorder ends with a sentence; the landing does not notice.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+        note='The file may not grow beyond a limit (RLIMIT_FSIZE), in place of a full disk.',
+    ),
+)
+
+_SIM_TIME = Setting(sim_time=True)
+
+CLOCK = (
+    Fault(
+        'clock_steps_forward',
+        'clock',
+        'The clock of all nodes steps 30 s ahead.',
+        ClockStep(30.0),
+        Expected(
+            reaches=(_HOLD, *LOOKING_AGAIN), within_s=1.0, recovers=GOING, recovers_within_s=20.0
+        ),
+        'Everything known is old at once: HOLD, until the map is new.',
+        setting=_SIM_TIME,
+    ),
+    Fault(
+        'clock_steps_back',
+        'clock',
+        'The clock of all nodes steps 30 s back.',
+        ClockStep(-30.0),
+        Expected(
+            reaches=(_HOLD, *LOOKING_AGAIN), within_s=1.0, recovers=GOING, recovers_within_s=20.0
+        ),
+        'What lies in the future is worthless: the map is dropped and begun anew.',
+        setting=_SIM_TIME,
+    ),
+)
+
+FAULTS = (*TELEMETRY, *LINE, *AUTOPILOT, *PROCESS, *CLOCK)
+"""In the order of the documentation."""
