@@ -11,6 +11,7 @@ import numpy as np
 from peace_ros.domain import BundleError
 from peace_ros.inference.contract import IMAGE_EMBEDDING, PIXEL_VALUES
 from peace_ros.inference.preprocess import Preprocessor
+from peace_ros.inference.providers import LoadMeter
 from peace_ros.inference.session import DEFAULT_PROVIDERS, open_sessions
 from peace_ros.inference.text_encoder import TextEncoder
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from peace_ros.domain import Frame
     from peace_ros.inference.bundle import Bundle
+    from peace_ros.inference.providers import Footprint
 
 
 class ClipEncoder:
@@ -48,6 +50,7 @@ class ClipEncoder:
             ConfigurationError: an execution provider is not available.
         """
         bundle.require_family('clip')
+        meter = LoadMeter()
         self._sessions = open_sessions(
             bundle, ('image_encoder', 'text_encoder'), threads=threads, providers=providers
         )
@@ -57,6 +60,10 @@ class ClipEncoder:
         blank = np.zeros((size.height, size.width, 3), np.uint8)
         image = self._sessions['image_encoder']
         image.warm_up([IMAGE_EMBEDDING], {PIXEL_VALUES: self._preprocess(blank)})
+        self.footprint: Footprint = meter.read(
+            bundle.manifest.name, bundle.manifest.precision, image.providers, threads
+        )
+        """What the networks run on and take."""
 
     @property
     def calls(self) -> Mapping[str, int]:

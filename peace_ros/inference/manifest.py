@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -87,6 +87,8 @@ class Manifest:
     """Family fastsam: how a segment goes into the image encoder; None in other families."""
     logit_scale: float = LOGIT_SCALE
     """What CLIP multiplies cosine similarities by before a softmax."""
+    verification: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    """How well the export agreed with its reference, e.g. ``cosine``; empty: not recorded."""
 
     @property
     def encoder_input(self) -> InputSpec:
@@ -170,9 +172,10 @@ def parse_manifest(raw: bytes, where: str) -> Manifest:
         files=files,
         licence=reader.text('licence'),
         provenance=reader.text('provenance'),
-        recommended=_recommended(reader) if 'recommended' in values else MappingProxyType({}),
+        recommended=_numbers(reader, 'recommended'),
         crop_input=_crop_input(reader, family),
         logit_scale=reader.positive('logit_scale', LOGIT_SCALE),
+        verification=_numbers(reader, 'verification'),
     )
 
 
@@ -229,9 +232,10 @@ def _crop_input(reader: _Reader, family: str) -> InputSpec | None:
     return _input(_Reader(f'{reader.where}: crop_input', reader.table('crop_input')), family)
 
 
-def _recommended(reader: _Reader) -> Mapping[str, float]:
-    values = reader.table('recommended')
-    for key, value in values.items():
+def _numbers(reader: _Reader, key: str) -> Mapping[str, float]:
+    """Return an optional table of numbers."""
+    values = reader.table(key) if reader.has(key) else {}
+    for name, value in values.items():
         if not _is_number(value):
-            raise BundleError(f'{reader.where}: recommended: {key} is {value!r}; give a number')
-    return MappingProxyType({key: float(value) for key, value in values.items()})
+            raise BundleError(f'{reader.where}: {key}: {name} is {value!r}; give a number')
+    return MappingProxyType({name: float(value) for name, value in values.items()})

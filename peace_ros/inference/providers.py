@@ -9,6 +9,11 @@ and have not been run, for want of such a machine.
 from __future__ import annotations
 
 import importlib.util
+import os
+import resource
+import sys
+import time
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from types import MappingProxyType
@@ -29,7 +34,7 @@ OPENVINO = 'OpenVINOExecutionProvider'
 
 _INSTALL: Mapping[str, str] = MappingProxyType(
     {
-        OPENVINO: 'run: pip install "peace_ros[openvino]"',
+        OPENVINO: 'run: pip install openvino',
         CUDA: 'install onnxruntime-gpu and CUDA in place of onnxruntime',
         TENSORRT: 'install onnxruntime-gpu and TensorRT in place of onnxruntime',
     }
@@ -62,6 +67,54 @@ def check_providers(providers: Sequence[str]) -> None:
             f'execution providers {", ".join(providers)}: {OPENVINO} runs whole graphs; '
             'name it first or not at all'
         )
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """What a bundle's networks take on their provider, measured when they were loaded."""
+
+    bundle: str
+    precision: str
+    providers: tuple[str, ...]
+    """Those in use."""
+    threads: int
+    memory_mb: float
+    """Growth of the process's resident memory (10^6 bytes), graphs, arrays and provider; what a
+    provider holds on a device of its own is not in it."""
+    ready_s: float
+    """From opening the files to the end of the first run."""
+
+    def __str__(self) -> str:
+        threads = f'{self.threads} thread{"s" if self.threads > 1 else ""}'
+        return (
+            f'{self.bundle} {self.precision} on {", ".join(self.providers)}, {threads}, '
+            f'{self.memory_mb:.0f} MB, warmed up in {self.ready_s:.1f} s'
+        )
+
+
+class LoadMeter:
+    """Measures what loading takes, from its making on; other loading beside it would count too."""
+
+    def __init__(self) -> None:
+        self._began_s, self._before_mb = time.perf_counter(), resident_mb()
+
+    def read(
+        self, bundle: str, precision: str, providers: Sequence[str], threads: int
+    ) -> Footprint:
+        """Return what was taken since this meter was made."""
+        grown_mb = max(0.0, resident_mb() - self._before_mb)
+        taken_s = time.perf_counter() - self._began_s
+        return Footprint(bundle, precision, tuple(providers), threads, grown_mb, taken_s)
+
+
+def resident_mb() -> float:
+    """Return the resident memory of this process, 10^6 bytes; without /proc, its peak."""
+    try:
+        pages = int(Path('/proc/self/statm').read_text(encoding='ascii').split()[1])
+    except OSError:
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return peak * (1 if sys.platform == 'darwin' else 1024) / 1e6
+    return pages * os.sysconf('SC_PAGE_SIZE') / 1e6
 
 
 def with_options(providers: Sequence[str], checksum: str) -> list[Any]:

@@ -25,6 +25,15 @@ if TYPE_CHECKING:
     from peace_ros.inference.bundle import Bundle
 
 DEFAULT_PROVIDERS = (CPU,)
+OPTIMISATIONS = MappingProxyType(
+    {
+        'none': ort.GraphOptimizationLevel.ORT_DISABLE_ALL,
+        'basic': ort.GraphOptimizationLevel.ORT_ENABLE_BASIC,
+        'extended': ort.GraphOptimizationLevel.ORT_ENABLE_EXTENDED,
+        'all': ort.GraphOptimizationLevel.ORT_ENABLE_ALL,
+    }
+)
+"""Of a graph, before it runs; from the least to the most."""
 
 # ONNX Runtime's errors have no common base of their own.
 _ORT_ERRORS: tuple[type[Exception], ...] = (
@@ -48,6 +57,7 @@ class Session:
         threads: int = 2,
         providers: Sequence[str] = DEFAULT_PROVIDERS,
         checksum: str = '',
+        optimisation: str = 'all',
     ) -> None:
         """Open a file.
 
@@ -57,14 +67,20 @@ class Session:
                 because the other nodes share the same cores.
             providers: names of execution providers, the preferred one first.
             checksum: SHA-256 of the file, the key of engines that a provider builds and keeps.
+            optimisation: of graphs by ONNX Runtime, one of :data:`OPTIMISATIONS`.
 
         Raises:
             ConfigurationError: a provider is not installed or none of them starts.
             BundleError: the file is no graph that ONNX Runtime can run.
         """
         check_providers(providers)
-        engine = _openvino if providers[0] == OPENVINO else _onnxruntime
-        self._engine, self.graph, self.providers = engine(path, threads, tuple(providers), checksum)
+        if providers[0] == OPENVINO:
+            opened = _openvino(path, threads)
+        else:
+            options = _options(threads, optimisation)
+            chosen = with_options(providers, checksum)
+            opened = _onnxruntime(path, options, chosen)
+        self._engine, self.graph, self.providers = opened
         """``providers``: those in use; ONNX Runtime adds the CPU as the last."""
         self.calls = 0
         """Runs since it was opened, without warm-ups."""
@@ -136,26 +152,29 @@ class _OnnxRuntimeEngine:
 _Opened = tuple[_OnnxRuntimeEngine | OpenVinoEngine, Graph, tuple[str, ...]]
 
 
-def _onnxruntime(path: Path, threads: int, providers: tuple[str, ...], checksum: str) -> _Opened:
+def _options(threads: int, optimisation: str) -> ort.SessionOptions:
     options = ort.SessionOptions()
-    options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_ENABLE_ALL
+    options.graph_optimization_level = OPTIMISATIONS[optimisation]
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.add_session_config_entry('session.intra_op.allow_spinning', '0')
     options.log_severity_level = 3  # errors: warnings about unused initialisers help nobody
+    return options
+
+
+def _onnxruntime(path: Path, options: ort.SessionOptions, providers: Sequence[Any]) -> _Opened:
     try:
-        session = ort.InferenceSession(
-            str(path), options, providers=with_options(providers, checksum)
-        )
+        session = ort.InferenceSession(str(path), options, providers=list(providers))
     except _ORT_ERRORS as error:
         raise BundleError(
             f'{path}: ONNX Runtime {ort.__version__} cannot open it ({error}); '
             'export the model again'
         ) from error
     in_use = tuple(session.get_providers())
-    if not set(providers) & set(in_use):
+    names = [each if isinstance(each, str) else each[0] for each in providers]
+    if not set(names) & set(in_use):
         raise ConfigurationError(
-            f'execution provider {", ".join(providers)} did not start for {path}, only '
+            f'execution provider {", ".join(names)} did not start for {path}, only '
             f'{", ".join(in_use)}; check its driver or add CPUExecutionProvider'
         )
     graph = Graph(
@@ -166,12 +185,7 @@ def _onnxruntime(path: Path, threads: int, providers: tuple[str, ...], checksum:
     return _OnnxRuntimeEngine(session), graph, in_use
 
 
-def _openvino(
-    path: Path,
-    threads: int,
-    providers: tuple[str, ...],  # noqa: ARG001 - the signature of an opener
-    checksum: str,  # noqa: ARG001
-) -> _Opened:
+def _openvino(path: Path, threads: int) -> _Opened:
     try:
         engine = OpenVinoEngine(path, threads)
     except RuntimeError as error:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a frame and its prompt to the safety of each pixel."""
 
+from peace_ros.segmentation.camera_watch import CameraWatch
 from peace_ros.segmentation.clipseg import ClipSegSegmenter
 from peace_ros.segmentation.fastsam import FastSamSegmenter
 from peace_ros.segmentation.fusion import FUSIONS, Fusion, set_difference, soft_difference
@@ -14,6 +15,7 @@ __all__ = [
     'FACTORIES',
     'FAMILIES',
     'FUSIONS',
+    'CameraWatch',
     'ClipSegSegmenter',
     'FastSamSegmenter',
     'Fusion',

@@ -4,24 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
-from peace_ros.inference import Bundle, Preprocessor, TextEncoder, open_sessions
+from peace_ros.inference import Bundle, Preprocessor
 from peace_ros.inference.contract import IS_POSITIVE, PIXEL_VALUES, TERM_LOGITS, TEXT_EMBEDDING
-from peace_ros.segmentation.fusion import FUSIONS, calibrated
-from peace_ros.segmentation.segmenter import SegmentationParameters
+from peace_ros.segmentation.fusion import calibrated
+from peace_ros.segmentation.segmenter import BundleSegmenter, SegmentationParameters
 from peace_ros.segmentation.terms import Terms
 
 _ROUNDING = 1e-3
 """How far beyond 0 and 1 a score may lie, from arithmetic in fp16 or int8."""
 
 
-class ClipSegSegmenter:
+class ClipSegSegmenter(BundleSegmenter):
     """A Segmenter over a bundle of the family ``clipseg``."""
 
     def __init__(self, bundle: Bundle, terms: Terms, parameters: SegmentationParameters) -> None:
@@ -43,23 +42,15 @@ class ClipSegSegmenter:
                 'name negative terms or choose set_difference'
             )
         bundle.require_family('clipseg')
-        self._terms = terms
-        self._fusion = FUSIONS[parameters.fusion]
         self._threshold = _threshold(bundle, parameters.fusion)
-        self._sessions = open_sessions(
-            bundle,
-            ('image_encoder', 'text_encoder', 'decoder'),
-            threads=parameters.threads,
-            providers=parameters.providers,
-        )
-        cache_dir = Path(parameters.cache_dir).expanduser() if parameters.cache_dir else None
-        self._text = TextEncoder(bundle, self._sessions['text_encoder'], cache_dir)
+        super().__init__(bundle, ('image_encoder', 'text_encoder', 'decoder'), terms, parameters)
         self._preprocess = Preprocessor(bundle.manifest.input)
         self._features = [each.name for each in self._sessions['image_encoder'].graph.outputs]
         self._is_positive = np.array(
             [1.0] * len(terms.positive) + [0.0] * len(terms.negative), np.float32
         )
         self._warm_up(bundle)
+        self._loaded()
 
     def _warm_up(self, bundle: Bundle) -> None:
         size = bundle.manifest.input
@@ -68,25 +59,6 @@ class ClipSegSegmenter:
         features = encoder.warm_up(self._features, {PIXEL_VALUES: self._preprocess(blank)})
         texts = np.zeros((len(self._terms), bundle.manifest.embedding_width), np.float32)
         self._sessions['decoder'].warm_up(self._fusion.outputs, self._feeds(features, texts))
-
-    @property
-    def terms(self) -> Terms:
-        """What it looks for."""
-        return self._terms
-
-    @property
-    def unknown_terms(self) -> Mapping[str, tuple[str, ...]]:
-        """Term -> its words that the model has never learned; it cannot see those."""
-        return self._text.unknown_words(self._terms.all)
-
-    @property
-    def calls(self) -> Mapping[str, int]:
-        """Role of a network -> how often it ran, without warm-ups."""
-        return {role: session.calls for role, session in self._sessions.items()}
-
-    def prepare(self, prompt: Prompt) -> None:
-        """Embed the prompt's texts ahead of the frame; may be called from another thread."""
-        self._embeddings(prompt)
 
     def segment(self, frame: Frame, prompt: Prompt) -> Heatmap:
         """Return the safety of each pixel at network resolution, with the frame's stamp.
@@ -104,9 +76,9 @@ class ClipSegSegmenter:
         """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``."""
         (logits,) = self._decode(frame, prompt, [TERM_LOGITS])
         if logits.ndim != 3 or logits.shape[0] != len(self._terms):
-            raise self._unusable(f'{TERM_LOGITS} of shape {logits.shape}')
+            raise self._unusable('decoder', f'{TERM_LOGITS} of shape {logits.shape}')
         if not np.isfinite(logits).all():
-            raise self._unusable(f'{TERM_LOGITS} that are not finite')
+            raise self._unusable('decoder', f'{TERM_LOGITS} that are not finite')
         # tanh never overflows, where exp would.
         maps: NDArray[np.float32] = 0.5 * np.tanh(0.5 * logits) + 0.5
         return maps
@@ -119,9 +91,6 @@ class ClipSegSegmenter:
         features = self._sessions['image_encoder'].run(self._features, {PIXEL_VALUES: pixels})
         return self._sessions['decoder'].run(outputs, self._feeds(features, texts))
 
-    def _embeddings(self, prompt: Prompt) -> NDArray[np.float32]:
-        return self._text([prompt.text_for(term) for term in self._terms.all])
-
     def _feeds(
         self, features: Sequence[NDArray[np.float32]], texts: NDArray[np.float32]
     ) -> dict[str, NDArray[np.float32]]:
@@ -133,19 +102,12 @@ class ClipSegSegmenter:
     def _checked(self, scores: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return scores h x w clipped to 0..1; refuse what is no score at all."""
         if scores.ndim != 2 or scores.size == 0:
-            raise self._unusable(f'scores of shape {scores.shape}')
+            raise self._unusable('decoder', f'scores of shape {scores.shape}')
         low, high = float(scores.min()), float(scores.max())
         # A comparison with NaN is false, so NaN is refused here too.
         if not (low >= -_ROUNDING and high <= 1.0 + _ROUNDING):
-            raise self._unusable(f'scores from {low} to {high}')
+            raise self._unusable('decoder', f'scores from {low} to {high} where 0 to 1 is due')
         return np.clip(scores, np.float32(0.0), np.float32(1.0))
-
-    def _unusable(self, what: str) -> BundleError:
-        path = self._sessions['decoder'].graph.path
-        return BundleError(
-            f'{path}: gave {what} where finite maps of 0 to 1 are due; the frame gets no '
-            'heatmap, choose another bundle if this stays'
-        )
 
 
 def _threshold(bundle: Bundle, fusion: str) -> float:

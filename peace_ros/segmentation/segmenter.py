@@ -1,18 +1,21 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What every open-vocabulary segmenter of the project can do, and its parameters."""
+"""What every open-vocabulary segmenter can do, what those over a bundle share, parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Frame, Heatmap, Prompt
+from peace_ros.domain import BundleError, Frame, Heatmap, Prompt
 from peace_ros.domain.parameters import check, parameter
+from peace_ros.inference import Bundle, TextEncoder, open_sessions
+from peace_ros.inference.providers import Footprint, LoadMeter
 from peace_ros.segmentation.fusion import FUSIONS
 from peace_ros.segmentation.terms import Terms
 
@@ -102,6 +105,11 @@ class Segmenter(Protocol):
         """Role of a network -> how often it ran, without warm-ups."""
         ...
 
+    @property
+    def footprint(self) -> Footprint:
+        """What its networks run on and take."""
+        ...
+
     def prepare(self, prompt: Prompt) -> None:
         """Embed the prompt's texts ahead of the frame; may be called from another thread."""
         ...
@@ -117,3 +125,76 @@ class Segmenter(Protocol):
     def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
         """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``."""
         ...
+
+
+class BundleSegmenter:
+    """What the segmenters over a bundle share: networks, texts and the fusion of terms."""
+
+    def __init__(
+        self,
+        bundle: Bundle,
+        roles: tuple[str, ...],
+        terms: Terms,
+        parameters: SegmentationParameters,
+    ) -> None:
+        """Open the bundle's graphs of these roles; :meth:`_loaded` is due after their first run.
+
+        Raises:
+            BundleError: the graphs do not fit the bundle.
+            ConfigurationError: an execution provider is not available.
+        """
+        self._meter = LoadMeter()
+        self._manifest = bundle.manifest
+        self._terms = terms
+        self._parameters = parameters
+        self._fusion = FUSIONS[parameters.fusion]
+        self._sessions = open_sessions(
+            bundle, roles, threads=parameters.threads, providers=parameters.providers
+        )
+        cache_dir = Path(parameters.cache_dir).expanduser() if parameters.cache_dir else None
+        self._text = TextEncoder(bundle, self._sessions['text_encoder'], cache_dir)
+        self._loaded()
+
+    def _loaded(self) -> None:
+        """Take stock of what the networks hold by now."""
+        providers = dict.fromkeys(
+            each for session in self._sessions.values() for each in session.providers
+        )
+        manifest = self._manifest
+        self._footprint = self._meter.read(
+            manifest.name, manifest.precision, tuple(providers), self._parameters.threads
+        )
+
+    @property
+    def terms(self) -> Terms:
+        """What it looks for."""
+        return self._terms
+
+    @property
+    def unknown_terms(self) -> Mapping[str, tuple[str, ...]]:
+        """Term -> its words that the model has never learned; it cannot see those."""
+        return self._text.unknown_words(self._terms.all)
+
+    @property
+    def calls(self) -> Mapping[str, int]:
+        """Role of a network -> how often it ran, without warm-ups."""
+        return {role: session.calls for role, session in self._sessions.items()}
+
+    @property
+    def footprint(self) -> Footprint:
+        """What its networks run on and take."""
+        return self._footprint
+
+    def prepare(self, prompt: Prompt) -> None:
+        """Embed the prompt's texts ahead of the frame; may be called from another thread."""
+        self._embeddings(prompt)
+
+    def _embeddings(self, prompt: Prompt) -> NDArray[np.float32]:
+        return self._text([prompt.text_for(term) for term in self._terms.all])
+
+    def _unusable(self, role: str, what: str) -> BundleError:
+        path = self._sessions[role].graph.path
+        return BundleError(
+            f'{path}: gave {what}, which cannot be used; the frame gets no heatmap, choose '
+            'another bundle if this stays'
+        )

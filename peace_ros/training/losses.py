@@ -20,7 +20,7 @@ from peace_ros.training.networks import STRIDE
 
 _CLASS_WEIGHTS = {
     Label.GRASS: 1.0, Label.BARE_GROUND: 1.0, Label.PAVED: 1.0, Label.BUILDING: 1.1,
-    Label.TREE: 1.6, Label.WATER: 1.5, Label.VEHICLE: 2.0, Label.PERSON: 4.0, Label.OBSTACLE: 2.0,
+    Label.TREE: 1.6, Label.WATER: 1.5, Label.VEHICLE: 2.0, Label.PERSON: 14.0, Label.OBSTACLE: 4.0,
 }  # fmt: skip
 _PARTIAL_WEIGHTS = {VEGETATION: 0.6, LOOSE_SURFACE: 0.6, OPEN_GROUND: 0.8, NOT_SAFE: 1.0}
 FALSE_SAFE_WEIGHT = 2.5

@@ -27,6 +27,7 @@ _ROOF_COLOURS = (
 _WATER_COLOURS = (
     (50, 80, 60), (60, 85, 55), (40, 60, 70), (70, 75, 60), (30, 40, 45), (45, 75, 95),
     (85, 85, 65), (60, 120, 130), (20, 28, 30), (95, 110, 100), (90, 75, 50), (50, 90, 75),
+    (45, 65, 50), (58, 78, 62), (72, 92, 76), (66, 86, 58), (40, 58, 40), (84, 100, 72),
 )  # fmt: skip
 
 _CROWN_COLOURS = (
@@ -201,14 +202,21 @@ def paste_water(image: Image, classes: Image, rng: np.random.Generator) -> None:
     """Paste a pond, canal or pool: a smooth shape with faint waves and glints."""
     height, side = image.shape[:2]
     size = rng.uniform(0.15, 1.0) * side
-    count = int(rng.integers(4, 12))
+    middle = np.array([rng.uniform(0, side), rng.uniform(0, height)])
+    if rng.random() < 0.35:
+        # A shore: the edge of something larger than the view.
+        size = 2.0 * side
+        away = rng.uniform(0, 2 * np.pi)
+        reach = rng.uniform(0.8, 1.9) * side
+        middle = np.array([side / 2, height / 2]) + reach * np.array([np.cos(away), np.sin(away)])
+    count = int(rng.integers(6, 12))
     angles = np.sort(rng.uniform(0, 2 * np.pi, count))
     radii = size * rng.uniform(0.5, 1.0, count)
     stretch = np.array([1.0, rng.uniform(0.2, 1.0)])
     turn = rng.uniform(0, np.pi)
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1) * radii[:, None] * stretch
-    polygon = ring @ rotation.T + (rng.uniform(0, side), rng.uniform(0, height))
+    polygon = ring @ rotation.T + middle
     mask = np.zeros((height, side), dtype=np.uint8)
     cv2.fillPoly(mask, [np.round(polygon).astype(np.int32)], 255)
     soft = int(rng.integers(1, 8)) * 2 + 1
@@ -281,7 +289,9 @@ def water_texture(rng: np.random.Generator, height: int, width: int) -> Image:
     sigma = rng.uniform(0.5, 2.5)
     waves = cv2.GaussianBlur(grain, (0, 0), sigmaX=sigma, sigmaY=sigma * rng.uniform(1, 3))
     fine = np.asarray(waves / (waves.std() + 1e-6))
-    value = 1.0 + rng.uniform(0, 0.12) * slow + rng.uniform(0, 0.07) * fine
+    if rng.random() < 0.5 and height == width:
+        fine = fine.T
+    value = 1.0 + rng.uniform(0, 0.12) * slow + rng.uniform(0, 0.12) * fine
     out = base * value[..., None]
     if rng.random() < 0.25:
         out = out + 90.0 * (fine > 2.2)[..., None]

@@ -88,7 +88,7 @@ def _paste(
     sun = np.array([np.cos(azimuth), np.sin(azimuth)]) * reach
     if rng.random() < 0.7:
         pasting.recolour_water(image, classes, rng)
-    if rng.random() < (0.16 if real else 0.12):
+    if rng.random() < (0.3 if real else 0.2):
         pasting.paste_water(image, classes, rng)
     if rng.random() < (0.3 if real else 0.1):
         most = int(np.clip(gsd_m * image.shape[0] / 9.0, 2, 7))

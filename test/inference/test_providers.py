@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from peace_ros.domain import BundleError, ConfigurationError
-from peace_ros.inference import Bundle, Session, open_sessions
+from peace_ros.inference import Bundle, ClipEncoder, Session, open_sessions
 from peace_ros.inference.providers import (
     CPU,
     CUDA,
     OPENVINO,
     TENSORRT,
+    LoadMeter,
     available_providers,
     check_providers,
     with_options,
@@ -30,7 +31,7 @@ needs_openvino = pytest.mark.skipif(
 
 @pytest.mark.parametrize(
     ('provider', 'remedy'),
-    [(OPENVINO, r'peace_ros\[openvino\]'), (CUDA, 'onnxruntime-gpu'), (TENSORRT, 'TensorRT')],
+    [(OPENVINO, 'pip install openvino'), (CUDA, 'onnxruntime-gpu'), (TENSORRT, 'TensorRT')],
 )
 def test_a_missing_provider_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch, provider: str, remedy: str
@@ -104,3 +105,20 @@ def test_openvino_names_a_file_that_is_no_graph(tmp_path: Path) -> None:
     path.write_bytes(b'not a graph')
     with pytest.raises(BundleError, match=r'broken\.onnx: OpenVINO cannot open it'):
         Session(path, providers=(OPENVINO,))
+
+
+def test_the_memory_that_loading_takes_is_counted() -> None:
+    meter = LoadMeter()
+    held = np.ones(12_000_000, np.float32)
+    footprint = meter.read('clip-b', 'int8', (CPU,), 2)
+    assert held.nbytes / 1e6 - 3.0 < footprint.memory_mb < 3.0 * held.nbytes / 1e6
+    assert footprint.ready_s > 0.0
+    assert str(footprint).startswith('clip-b int8 on CPUExecutionProvider, 2 threads, ')
+    assert ' MB, warmed up in ' in str(footprint)
+
+
+def test_an_encoder_tells_where_it_runs_and_what_it_takes(clip_folder: Path) -> None:
+    footprint = ClipEncoder(Bundle.load(clip_folder), threads=1).footprint
+    assert (footprint.bundle, footprint.providers) == ('clip-tiny', (CPU,))
+    assert footprint.threads == 1
+    assert 0.0 <= footprint.memory_mb < 1000.0

@@ -189,3 +189,32 @@ def test_going_back_in_time_or_a_reset_begins_anew(
 def test_parameters_out_of_bounds_are_refused(changes: dict[str, Any], says: str) -> None:
     with pytest.raises(ConfigurationError, match=says):
         PromptingParameters(**changes)
+
+
+def test_between_two_rankings_the_last_prompt_holds(
+    encoder: Any, vocabularies: Vocabularies
+) -> None:
+    generator = make(encoder, vocabularies, interval_s=2.0)
+    encoder.scores = SPRING
+    first = generator.generate(frame_at(1_000_000_000))
+    encoder.scores = {**SPRING, 'spring': 0.0, 'winter': 0.9}
+    held = generator.generate(frame_at(2_999_999_999))
+    assert (held.template, held.ranking) == (first.template, first.ranking)
+    assert held.stamp_ns == 2_999_999_999
+    assert encoder.images == 1
+    due = generator.generate(frame_at(3_000_000_000))
+    assert due.text_for('grass') == 'A rendered image of grass in winter.'
+    assert encoder.images == 2
+
+
+def test_the_interval_counts_from_the_last_ranking_and_a_new_sequence_ranks_at_once(
+    encoder: Any, vocabularies: Vocabularies
+) -> None:
+    generator = make(encoder, vocabularies, interval_s=1.0)
+    encoder.scores = SPRING
+    for stamp_ns in range(0, 3_000_000_000, 400_000_000):
+        generator.generate(frame_at(stamp_ns))
+    # Ranked at 0, 1.2 and 2.4 s.
+    assert encoder.images == 3
+    generator.generate(frame_at(0))
+    assert encoder.images == 4

@@ -80,10 +80,11 @@ def clip(clip_folder: Path) -> Bundle:
     return Bundle.load(clip_folder)
 
 
-def export(*args: Any, **options: Any) -> Bundle:
+def export(checkpoint: Path, clip: Bundle, folder: Path, **options: Any) -> Bundle:
     from peace_ros.inference.export.fastsam import export_fastsam
 
-    return export_fastsam(*args, side_px=SIDE_PX, **options)
+    export_fastsam(checkpoint, clip, folder, side_px=SIDE_PX, **options)
+    return Bundle.load(folder)
 
 
 def test_the_bundle_runs_and_says_its_licence(
@@ -115,10 +116,11 @@ def test_a_network_that_changes_on_the_way_is_refused_and_the_old_bundle_stays(
 
     folder = tmp_path / 'fastsam-s'
     before = export(checkpoint, clip, folder).checksum
-    write = fastsam._write_segmenter
+    write = fastsam._write_image_encoder
 
-    def damage(model: Any, path: Path, side_px: int) -> None:
-        write(model, path, side_px)
+    def damage(clip: Bundle, encoder: Path) -> None:
+        write(clip, encoder)
+        path = encoder.with_name('segmenter.onnx')
         graph = onnx.load(str(path))
         for tensor in graph.graph.initializer:
             if tensor.data_type == onnx.TensorProto.FLOAT:
@@ -126,8 +128,8 @@ def test_a_network_that_changes_on_the_way_is_refused_and_the_old_bundle_stays(
                 tensor.CopyFrom(numpy_helper.from_array(values, tensor.name))
         onnx.save(graph, str(path))
 
-    monkeypatch.setattr(fastsam, '_write_segmenter', damage)
-    with pytest.raises(BundleError, match='differ from the reference'):
+    monkeypatch.setattr(fastsam, '_write_image_encoder', damage)
+    with pytest.raises(BundleError, match=r'FastSAM-s in fp32 does not agree .* are allowed'):
         export(checkpoint, clip, folder)
     assert Bundle.load(folder).checksum == before
     assert sorted(each.name for each in tmp_path.iterdir() if each.name.startswith('.')) == []
@@ -158,8 +160,126 @@ def test_a_missing_checkpoint_is_not_looked_for_on_the_network(
         export(tmp_path / 'FastSAM-s.pt', clip, tmp_path / 'x')
 
 
+@pytest.fixture
+def graph_file(tmp_path: Path) -> Path:
+    """What `yolo export` writes: other names, and a licence in the metadata."""
+    network = _Network()
+    network.model[1].export = True
+    path = tmp_path / 'FastSAM-s.onnx'
+    torch.onnx.export(
+        network.eval(), (torch.zeros(1, 3, SIDE_PX, SIDE_PX),), str(path), dynamo=False,
+        opset_version=17, input_names=['images'], output_names=['output0', 'output1'],
+    )  # fmt: skip
+    model = onnx.load(str(path))
+    onnx.helper.set_model_props(model, {'license': 'AGPL-3.0 License'})
+    onnx.save(model, str(path))
+    return path
+
+
+def test_an_exported_graph_needs_neither_ultralytics_nor_torch(
+    graph_file: Path, clip: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:  # fmt: skip
+    monkeypatch.setitem(sys.modules, 'ultralytics', None)
+    with caplog.at_level(logging.WARNING):
+        bundle = export(graph_file, clip, tmp_path / 'out')
+    assert 'AGPL-3.0' in caplog.text
+    assert 'AGPL-3.0' in bundle.manifest.licence
+    pixels = np.random.default_rng(1).random((1, 3, SIDE_PX, SIDE_PX), np.float32)
+    have = Session(bundle.paths['segmenter']).run(
+        ['predictions', 'prototypes'], {'pixel_values': pixels}
+    )
+    wanted = Session(graph_file).run(['output0', 'output1'], {'images': pixels})
+    for ours, theirs in zip(have, wanted, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_a_graph_of_another_side_is_refused(graph_file: Path, clip: Bundle, tmp_path: Path) -> None:
+    from peace_ros.inference.export.fastsam import export_fastsam
+
+    with pytest.raises(ConfigurationError, match='exported for 64 px, --side 96 cannot change'):
+        export_fastsam(graph_file, clip, tmp_path / 'x', side_px=96)
+
+
+def test_another_graph_is_refused(clip: Bundle, tmp_path: Path) -> None:
+    from peace_ros.inference.export.fastsam import export_fastsam
+
+    path = tmp_path / 'clip.onnx'
+    path.write_bytes(clip.paths['image_encoder'].read_bytes())
+    with pytest.raises(BundleError, match=r'FastSAM gives predictions \[1, 5 \+ K, A\]'):
+        export_fastsam(path, clip, tmp_path / 'x')
+    path.write_bytes(b'cut')
+    with pytest.raises(BundleError, match='no readable ONNX graph'):
+        export_fastsam(path, clip, tmp_path / 'x')
+
+
+def narrow_network() -> Any:
+    from peace_ros.inference.export.random_fastsam import Yolo, _calm_the_heads
+
+    torch.manual_seed(0)
+    network = Yolo(1 / 3, 0.125, 1024, SIDE_PX).eval()
+    with torch.no_grad():
+        _calm_the_heads(network)
+    return network
+
+
+@pytest.mark.parametrize('precision', ['fp32', 'fp16', 'int8'])
+def test_each_precision_is_held_against_the_reference(
+    clip: Bundle, tmp_path: Path, precision: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from peace_ros.inference.export import fastsam
+    from peace_ros.inference.export.segmenters import from_network
+
+    source = from_network(
+        narrow_network(), 'narrow', SIDE_PX, licence='none', provenance='random weights'
+    )
+    if precision == 'int8':  # random weights lose more in int8 than is allowed
+        monkeypatch.setattr(fastsam, 'LEAST_COSINE', 0.9)
+        monkeypatch.setattr(fastsam, 'LEAST_IOU', 0.5)
+    agreement = fastsam.export_fastsam(source, clip, tmp_path / 'x', precision=precision)
+    bundle = Bundle.load(tmp_path / 'x')
+    assert bundle.manifest.precision == precision
+    assert f'random weights in {precision}; CLIP in fp32' in bundle.manifest.provenance
+    assert 0.9 < agreement.cosine <= 1.0 + 1e-9
+    assert (agreement.error <= fastsam.MOST_ERROR) == (precision != 'int8')
+    graph = onnx.load(str(bundle.paths['segmenter'])).graph
+    kinds = {each.data_type for each in graph.initializer}
+    quantised = [each for each in graph.node if each.op_type == 'QuantizeLinear']
+    assert (onnx.TensorProto.FLOAT16 in kinds) == (precision == 'fp16')
+    assert bool(quantised) == (precision == 'int8')
+
+
+def test_a_poor_precision_is_refused() -> None:
+    from peace_ros.inference.export.fastsam import SegmenterAgreement
+
+    poor = SegmenterAgreement(0.001, 0.0001, 0.9985, 0.99)
+    poor.refuse_if_poor('fp32', 'FastSAM-s')
+    with pytest.raises(BundleError, match=r'cosine 0\.99850.*Nothing was written'):
+        poor.refuse_if_poor('int8', 'FastSAM-s')
+
+
+def test_the_command_exports_and_says_how_well_it_agrees(
+    graph_file: Path, clip_folder: Path, tmp_path: Path
+) -> None:
+    import typer
+    from typer.testing import CliRunner
+
+    from peace_ros.inference.export import commands
+
+    app = typer.Typer()
+    app.command()(commands.export)
+    options = ['--clip', str(clip_folder), '--out', str(tmp_path / 'models')]
+    result = CliRunner().invoke(app, [str(graph_file), *options])
+    assert result.exit_code == 0, result.output
+    assert 'agrees with its reference: boxes differ by 0 px' in result.output
+    assert Bundle.load(tmp_path / 'models' / 'FastSAM-s-fp32').manifest.family == 'fastsam'
+    refused = CliRunner().invoke(app, [str(graph_file)])
+    assert isinstance(refused.exception, ConfigurationError)
+    assert '--clip BUNDLE' in str(refused.exception)
+
+
 def test_a_class_token_is_repeated_for_every_image(tmp_path: Path) -> None:
-    from peace_ros.inference.export.fastsam import free_batch
+    from peace_ros.inference.export.batching import free_batch
 
     rng = np.random.default_rng(0)
     node = helper.make_node

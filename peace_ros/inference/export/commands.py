@@ -23,7 +23,8 @@ def export(
         str,
         typer.Argument(
             help='Hugging Face id (CIDAS/clipseg-rd64-refined, openai/clip-vit-base-patch32), '
-            'local folder, or OpenAI/OpenCLIP checkpoint.'
+            'local folder, OpenAI/OpenCLIP checkpoint; with --clip FastSAM-s.pt or -x.pt, or the '
+            '.onnx of one.'
         ),
     ],
     *,
@@ -37,13 +38,23 @@ def export(
         typer.Option(metavar='DIR', help='Nadir photos to calibrate and verify on.'),
     ] = None,
     licence: Annotated[str, typer.Option(help='Licence of the weights.')] = 'that of the source',
+    clip: Annotated[
+        str, typer.Option(metavar='BUNDLE', help='FastSAM: the CLIP bundle that scores segments.')
+    ] = '',
+    side: Annotated[
+        int, typer.Option(metavar='PX', help='FastSAM: side of its input; 0: its own, else 640.')
+    ] = 0,
 ) -> None:
-    """Export CLIP or CLIPSeg, verify it against the reference, and put the bundle in place."""
-    missing = [each for each in _NEEDED if importlib.util.find_spec(each) is None]
-    if missing:
+    """Export CLIP, CLIPSeg or FastSAM, verify it against its reference, put it in place."""
+    if clip:
+        _export_fastsam(Path(source), clip, out, name, precision, images, side)
+        return
+    if side or Path(source).suffix == '.onnx' or 'fastsam' in Path(source).name.lower():
         raise ConfigurationError(
-            f'export needs {", ".join(missing)}: run pip install "peace_ros[export]"'
+            f'{source}: FastSAM needs a CLIP to score its segments: export one and name its '
+            'bundle, --clip BUNDLE'
         )
+    _require(_NEEDED)
     from peace_ros.inference.export.build import build_bundle  # noqa: PLC0415 - needs torch
     from peace_ros.inference.export.pictures import read_pictures  # noqa: PLC0415
     from peace_ros.inference.export.sources import load_source  # noqa: PLC0415
@@ -56,6 +67,41 @@ def export(
     typer.echo(f'{folder}: agrees with its reference: {agreement}')
     if frames is None:
         typer.echo("(checked on drawn scenes; give --images DIR with photos like a flight's)")
+
+
+def _export_fastsam(
+    source: Path,
+    clip: str,
+    out: Path | None,
+    name: str,
+    precision: str,
+    images: Path | None,
+    side_px: int,
+) -> None:
+    _require(('onnx',) if source.suffix == '.onnx' else ('torch', 'onnx'))
+    from peace_ros.inference.bundle import Bundle  # noqa: PLC0415
+    from peace_ros.inference.export.fastsam import export_fastsam  # noqa: PLC0415
+    from peace_ros.inference.export.pictures import read_pictures  # noqa: PLC0415
+
+    folder = (out or user_models_dir()) / (name or f'{source.stem}-{precision}')
+    typer.echo(f'exporting {source} (fastsam) in {precision}, scored by {clip} ...')
+    agreement = export_fastsam(
+        source.expanduser(),
+        Bundle.load(clip),
+        folder,
+        side_px=side_px,
+        precision=precision,
+        frames=read_pictures(images) if images else None,
+    )
+    typer.echo(f'{folder}: agrees with its reference: {agreement}')
+
+
+def _require(packages: tuple[str, ...]) -> None:
+    missing = [each for each in packages if importlib.util.find_spec(each) is None]
+    if missing:
+        raise ConfigurationError(
+            f'export needs {", ".join(missing)}: run pip install -e ".[export]" in the checkout'
+        )
 
 
 def fetch(

@@ -1,237 +1,205 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A FastSAM checkpoint and a CLIP bundle -> a bundle of the family fastsam.
-
-The checkpoint is read by ultralytics, an optional extra under AGPL-3.0 that is imported here and
-nowhere else. The bundle runs without it.
-"""
+"""FastSAM's segmenter and a CLIP bundle -> a bundle of the family fastsam."""
 
 from __future__ import annotations
 
-import importlib
 import json
 import logging
 import shutil
-import warnings
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import onnx
-import torch
-from onnx import helper, numpy_helper
+from numpy.typing import NDArray
 
-from peace_ros.domain import BundleError, ConfigurationError
-from peace_ros.inference.bundle import MANIFEST_NAME, Bundle, file_entry, sha256_of
+from peace_ros.domain import BundleError, ConfigurationError, Frame
+from peace_ros.inference.bundle import MANIFEST_NAME, Bundle, file_entry
 from peace_ros.inference.contract import IMAGE_EMBEDDING, PIXEL_VALUES, PREDICTIONS, PROTOTYPES
-from peace_ros.inference.export.build import staged
-from peace_ros.inference.manifest import FORMAT
+from peace_ros.inference.export.batching import free_batch
+from peace_ros.inference.export.convolutions import to_int8_convolutions
+from peace_ros.inference.export.pictures import draw_pictures
+from peace_ros.inference.export.precision import to_fp16
+from peace_ros.inference.export.segmenters import Outputs, SegmenterSource, load_segmenter
+from peace_ros.inference.export.staging import staged
+from peace_ros.inference.manifest import FORMAT, PRECISIONS, InputSpec
+from peace_ros.inference.preprocess import Preprocessor
 from peace_ros.inference.session import Session, open_sessions
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _LOG = logging.getLogger(__name__)
 
-OPSET = 17
-LICENCE_NOTE = (
-    'ultralytics is under AGPL-3.0, and so is a FastSAM network that it reads and converts: who '
-    'passes the bundle on, or lets others use it over a network, owes them the complete source '
-    'code under AGPL-3.0, or needs a licence from Ultralytics'
-)
 MOST_BOX_ERROR_PX = 0.01
 MOST_ERROR = 1e-3
-"""Of confidences, coefficients and prototypes, against torch."""
-_STRIDE_PX = 32
-_CHECKED_IMAGES = 3
+"""Of confidences, coefficients and prototypes, against the reference, fp32."""
+LEAST_COSINE = 0.999
+LEAST_IOU = 0.98
+"""Of the surest masks; both for fp16 and int8, as for the other families."""
+_SUREST = 50
+_CHECKED_BATCH = 3
 
 
-def export_fastsam(checkpoint: Path, clip: Bundle, folder: Path, *, side_px: int = 640) -> Bundle:
-    """Write a fastsam bundle, hold it against torch, and only then put it in its place.
+@dataclass(frozen=True)
+class SegmenterAgreement:
+    """How well a segmenter and its reference agree; the worst over all images."""
+
+    box_error_px: float
+    error: float
+    """Largest difference of a confidence, a coefficient or a prototype."""
+    cosine: float
+    """The least of those of boxes, confidences, coefficients and prototypes."""
+    iou: float
+    """Of the surest masks of the reference, at the same anchors and taken together."""
+
+    def refuse_if_poor(self, precision: str, what: str) -> None:
+        """Raise BundleError when the bundle must not be used."""
+        if precision == 'fp32':
+            is_good = self.box_error_px <= MOST_BOX_ERROR_PX and self.error <= MOST_ERROR
+            limit = f'{MOST_BOX_ERROR_PX} px and {MOST_ERROR} are allowed'
+            remedy = 'export with other versions of torch and ultralytics'
+        else:
+            is_good = self.cosine >= LEAST_COSINE and self.iou >= LEAST_IOU
+            limit = f'a cosine of {LEAST_COSINE} and an IoU of {LEAST_IOU} are needed'
+            remedy = 'choose a higher precision, or more pictures like those of the flight'
+        if not is_good:
+            raise BundleError(
+                f'{what} in {precision} does not agree with its reference: {self}; {limit}. '
+                f'Nothing was written; {remedy}'
+            )
+
+    def __str__(self) -> str:
+        return (
+            f'boxes differ by {self.box_error_px:.2g} px and the rest by {self.error:.2g} at most, '
+            f'cosine {self.cosine:.5f}, mask IoU {self.iou:.4f}'
+        )
+
+
+def export_fastsam(
+    source: Path | SegmenterSource,
+    clip: Bundle,
+    folder: Path,
+    *,
+    side_px: int = 0,
+    precision: str = 'fp32',
+    frames: Sequence[Frame] | None = None,
+) -> SegmenterAgreement:
+    """Write a fastsam bundle, hold it against the reference, and only then put it in its place.
 
     Args:
-        checkpoint: FastSAM-s.pt or FastSAM-x.pt. Reading it runs code that it may hold: take it
-            from where you trust.
-        clip: bundle of the family clip.
+        source: FastSAM-s.pt, FastSAM-x.pt or an exported graph, see :func:`load_segmenter`.
+        clip: bundle of the family clip; its own precision stays.
         folder: where the bundle goes; one that is there stays until the new one is verified.
-        side_px: side of the square that frames are letterboxed into, a multiple of 32.
+        side_px: of the input, for a source that is a file.
+        precision: of the segmenter: fp32, fp16 (GPU) or int8 (CPU).
+        frames: images to calibrate and verify on; None: drawn ones.
+
+    Returns:
+        How well the segmenter agrees with its reference.
 
     Raises:
-        ConfigurationError: ultralytics is not installed, or the side cannot be used.
-        BundleError: the checkpoint, the CLIP bundle or the folder cannot be used, or the exported
-            network answers otherwise than torch does.
+        ConfigurationError: the precision or side is unknown, or ultralytics is missing.
+        BundleError: source, CLIP bundle or folder cannot be used, or the exported network answers
+            otherwise than its reference. Nothing changes then.
     """
-    if side_px < _STRIDE_PX or side_px % _STRIDE_PX:
-        raise ConfigurationError(
-            f'input side {side_px} px: give a multiple of {_STRIDE_PX}, e.g. 640 or 1024'
-        )
+    if precision not in PRECISIONS:
+        raise ConfigurationError(f'precision {precision!r}: choose one of {", ".join(PRECISIONS)}')
     clip.require_family('clip')
-    model = load_checkpoint(checkpoint)
+    segmenter = load_segmenter(source, side_px) if isinstance(source, Path) else source
+    images = _images(segmenter.side_px, frames)
     with staged(folder) as stage:
-        _write_segmenter(model, stage / 'segmenter.onnx', side_px)
+        graph = stage / 'segmenter.onnx'
+        segmenter.write(graph)
+        if precision == 'fp16':
+            to_fp16(graph)
+        elif precision == 'int8':
+            to_int8_convolutions(graph, images)
         _write_image_encoder(clip, stage / 'image_encoder.onnx')
         for role in ('text_encoder', 'tokenizer'):
-            source = clip.paths[role]
-            shutil.copyfile(source, stage / f'{role}{source.suffix}')
-        _write_manifest(stage, folder.name, clip, checkpoint, side_px)
-        verify_fastsam(Bundle.load(stage), model)
-    return Bundle.load(folder)
+            path = clip.paths[role]
+            shutil.copyfile(path, stage / f'{role}{path.suffix}')
+        _write_manifest(stage, folder.name, clip, segmenter, precision)
+        agreement = verify_segmenter(Bundle.load(stage), segmenter, images)
+        agreement.refuse_if_poor(precision, segmenter.name)
+        _note_agreement(stage / MANIFEST_NAME, agreement)
+    return agreement
 
 
-def load_checkpoint(checkpoint: Path) -> Any:
-    """Return the torch network of a FastSAM checkpoint, ready to export.
+def verify_segmenter(
+    bundle: Bundle, source: SegmenterSource, images: Sequence[NDArray[np.float32]]
+) -> SegmenterAgreement:
+    """Hold the bundle's graphs against the contract and its segmenter against the reference.
 
-    Raises ConfigurationError without ultralytics, BundleError for another network.
+    Raises BundleError for graphs that do not fit.
     """
-    try:
-        ultralytics = importlib.import_module('ultralytics')
-    except ImportError as error:
-        raise ConfigurationError(
-            f'FastSAM checkpoints are read by ultralytics, which is not installed ({error}): '
-            f'`pip install ultralytics` in an environment of its own. {LICENCE_NOTE}'
-        ) from error
-    _LOG.warning('%s: %s', checkpoint, LICENCE_NOTE)
-    if not checkpoint.is_file():  # ultralytics would look for it on the network
-        raise BundleError(f'{checkpoint}: no such file; give FastSAM-s.pt or FastSAM-x.pt')
-    try:
-        model = ultralytics.YOLO(str(checkpoint)).model.float()
-    except Exception as error:  # unpickling raises whatever the file makes it raise
-        raise BundleError(
-            f'{checkpoint}: ultralytics cannot read it ({type(error).__name__}: {error}); fetch '
-            'it again'
-        ) from error
-    head = model.model[-1]
-    masks, classes = getattr(head, 'nm', 0), getattr(head, 'nc', 0)
-    if masks < 1 or classes != 1 or getattr(head, 'end2end', False):
-        raise BundleError(
-            f'{checkpoint}: a {type(head).__name__} network of {classes} classes; FastSAM '
-            'segments and knows one class, give FastSAM-s.pt or FastSAM-x.pt'
+    session = open_sessions(bundle, ('segmenter', 'image_encoder', 'text_encoder'))['segmenter']
+    worst = SegmenterAgreement(0.0, 0.0, 1.0, 1.0)
+    for pixels in images:
+        predictions, prototypes = session.run([PREDICTIONS, PROTOTYPES], {PIXEL_VALUES: pixels})
+        found = _compare((predictions, prototypes), source.run(pixels), source.side_px)
+        worst = SegmenterAgreement(
+            max(worst.box_error_px, found.box_error_px),
+            max(worst.error, found.error),
+            min(worst.cosine, found.cosine),
+            min(worst.iou, found.iou),
         )
-    model = model.eval().fuse(verbose=False)
-    for module in model.modules():
-        if hasattr(module, 'export'):
-            module.export, module.format = True, 'onnx'
-    return model
+    _LOG.info('%s: %s', bundle.paths['segmenter'].name, worst)
+    return worst
 
 
-def verify_fastsam(bundle: Bundle, model: Any) -> None:
-    """Hold the bundle's graphs against the contract and its segmenter against torch.
-
-    Raises BundleError with the largest difference.
-    """
-    roles = ('segmenter', 'image_encoder', 'text_encoder')
-    segmenter = open_sessions(bundle, roles)['segmenter']
-    size = bundle.manifest.input
-    rng = np.random.default_rng(0)
-    for _ in range(_CHECKED_IMAGES):
-        coarse = rng.uniform(0.0, 1.0, (1, 3, size.height // 16, size.width // 16))
-        pixels = coarse.repeat(16, axis=2).repeat(16, axis=3).astype(np.float32)
-        with torch.no_grad():
-            wanted = [each.numpy() for each in model(torch.from_numpy(pixels))]
-        have = segmenter.run([PREDICTIONS, PROTOTYPES], {PIXEL_VALUES: pixels})
-        path = bundle.paths['segmenter']
-        _compare(path, 'boxes', have[0][:, :4], wanted[0][:, :4], MOST_BOX_ERROR_PX)
-        _compare(path, 'confidences', have[0][:, 4:], wanted[0][:, 4:], MOST_ERROR)
-        _compare(path, 'prototypes', have[1], wanted[1], MOST_ERROR)
+def _images(side_px: int, frames: Sequence[Frame] | None) -> list[NDArray[np.float32]]:
+    plain = InputSpec(side_px, side_px, 'stretch', (0.0,) * 3, (1.0,) * 3)
+    preprocess = Preprocessor(plain)
+    return [preprocess(each.image_rgb).copy() for each in frames or draw_pictures(_CHECKED_BATCH)]
 
 
-def _compare(path: Path, what: str, have: NDArray[Any], wanted: NDArray[Any], most: float) -> None:
-    error = float(np.abs(have - wanted).max()) if have.shape == wanted.shape else float('inf')
-    _LOG.info('%s: %s differ from the reference by %.2g at most', path.name, what, error)
-    if not error <= most:
-        raise BundleError(
-            f'{path}: {what} of shape {have.shape} differ from the reference {wanted.shape} by '
-            f'{error:.3g} where {most} is allowed; export with other versions of torch and '
-            'ultralytics'
-        )
-
-
-def free_batch(model: onnx.ModelProto) -> None:
-    """Let a graph that was exported for one image take any number of them, in place.
-
-    Reshapes copy their first axis instead of naming it, and constants that are joined to the
-    images' arrays (the class token) are repeated. Whether that was enough is for a check of the
-    result against single images to say.
-    """
-    graph = model.graph
-    shapes = _shapes(graph)
-    constants = _constants(graph)
-    ranks = _ranks(model)
-    batch = [
-        helper.make_node('Shape', [PIXEL_VALUES], ['batch_shape']),
-        helper.make_node('Slice', ['batch_shape', 'batch_from', 'batch_to'], ['batch_size']),
+def _compare(have: Outputs, wanted: Outputs, side_px: int) -> SegmenterAgreement:
+    if [each.shape for each in have] != [each.shape for each in wanted]:
+        return SegmenterAgreement(float('inf'), float('inf'), 0.0, 0.0)
+    pairs = [
+        (have[0][:, rows], wanted[0][:, rows]) for rows in (slice(4), slice(4, 5), slice(5, None))
     ]
-    nodes = []
-    for node in graph.node:
-        if node.op_type == 'Reshape' and node.input[0] not in constants:
-            _copy_first_axis(graph, node, shapes)
-        axis = next((each.i for each in node.attribute if each.name == 'axis'), 0)
-        if node.op_type == 'Concat' and axis != 0 and not constants.issuperset(node.input):
-            for index, name in enumerate(node.input):
-                if name in constants:
-                    nodes += _repeat(graph, node, index, ranks[node.output[0]])
-        nodes.append(node)
-    for name, value in (('batch_from', [0]), ('batch_to', [1])):
-        graph.initializer.append(numpy_helper.from_array(np.array(value, np.int64), name))
-    del graph.node[:]
-    graph.node.extend(batch + nodes)
-    del graph.value_info[:]
-    for tensor in (*graph.input, *graph.output):
-        tensor.type.tensor_type.shape.dim[0].dim_param = 'B'
+    pairs.append((have[1], wanted[1]))
+    errors = [float(np.abs(ours - theirs).max()) for ours, theirs in pairs]
+    return SegmenterAgreement(
+        errors[0],
+        max(errors[1:]),
+        min(_cosine(ours, theirs) for ours, theirs in pairs),
+        _mask_iou(have, wanted, side_px),
+    )
 
 
-def _constants(graph: onnx.GraphProto) -> set[str]:
-    """Return the names of arrays that do not depend on the input."""
-    names = {tensor.name for tensor in graph.initializer}
-    for node in graph.node:
-        if all(name in names or not name for name in node.input):
-            names.update(node.output)
-    return names
+def _cosine(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
+    flat, other = a.ravel().astype(np.float64), b.ravel().astype(np.float64)
+    return float(flat @ other / max(np.linalg.norm(flat) * np.linalg.norm(other), 1e-12))
 
 
-def _ranks(model: onnx.ModelProto) -> dict[str, int]:
-    inferred = onnx.shape_inference.infer_shapes(model)
-    return {each.name: len(each.type.tensor_type.shape.dim) for each in inferred.graph.value_info}
+def _mask_iou(have: Outputs, wanted: Outputs, side_px: int) -> float:
+    """Return the IoU of the surest masks of the reference, taken together, in prototype cells."""
+    surest = np.argsort(-wanted[0][0, 4])[:_SUREST]
+    ours, theirs = (_masks(each, surest, side_px) for each in (have, wanted))
+    union = np.count_nonzero(ours | theirs)
+    return float(np.count_nonzero(ours & theirs) / union) if union else 1.0
 
 
-def _shapes(graph: onnx.GraphProto) -> dict[str, NDArray[Any]]:
-    """Return the vectors of whole numbers that the graph holds, by name."""
-    tensors = [(each.name, each) for each in graph.initializer]
-    tensors += [
-        (node.output[0], node.attribute[0].t)
-        for node in graph.node
-        if node.op_type == 'Constant' and node.attribute[0].name == 'value'
-    ]
-    return {
-        name: numpy_helper.to_array(each)
-        for name, each in tensors
-        if each.data_type == onnx.TensorProto.INT64 and len(each.dims) == 1
-    }
+def _masks(outputs: Outputs, anchors: NDArray[np.intp], side_px: int) -> NDArray[np.bool_]:
+    """Return the masks of these anchors inside their boxes, [N, h, w]."""
+    rows, prototypes = outputs[0][0][:, anchors].T, outputs[1][0]
+    count, height, width = prototypes.shape
+    masks = (rows[:, 5:] @ prototypes.reshape(count, -1)).reshape(-1, height, width) > 0.0
+    x_px = (np.arange(width, dtype=np.float32) + np.float32(0.5)) * np.float32(side_px / width)
+    y_px = (np.arange(height, dtype=np.float32) + np.float32(0.5)) * np.float32(side_px / height)
+    in_columns = (np.abs(x_px - rows[:, :1]) < rows[:, 2:3] / 2)[:, None, :]
+    in_rows = (np.abs(y_px - rows[:, 1:2]) < rows[:, 3:4] / 2)[:, :, None]
+    inside: NDArray[np.bool_] = masks & in_columns & in_rows
+    return inside
 
 
-def _copy_first_axis(
-    graph: onnx.GraphProto, node: onnx.NodeProto, shapes: dict[str, NDArray[Any]]
-) -> None:
-    shape = shapes.get(node.input[1])
-    if shape is not None and shape.size > 1 and shape[0] == 1:
-        name = f'{node.output[0]}_batched'
-        first_as_in_input = np.concatenate([np.zeros(1, np.int64), shape[1:]])
-        graph.initializer.append(numpy_helper.from_array(first_as_in_input, name))
-        node.input[1] = name
-
-
-def _repeat(
-    graph: onnx.GraphProto, node: onnx.NodeProto, index: int, rank: int
-) -> list[onnx.NodeProto]:
-    """Make a constant of a concatenation as long as the batch; return the nodes for that."""
-    name = node.input[index]
-    ones, shape, repeated = f'{name}_ones', f'{name}_shape', f'{name}_repeated'
-    graph.initializer.append(numpy_helper.from_array(np.ones(rank - 1, np.int64), ones))
-    node.input[index] = repeated
-    return [
-        helper.make_node('Concat', ['batch_size', ones], [shape], axis=0),
-        helper.make_node('Expand', [name, shape], [repeated]),
-    ]
+def _note_agreement(manifest: Path, agreement: SegmenterAgreement) -> None:
+    values = json.loads(manifest.read_text(encoding='utf-8'))
+    values['verification'] = asdict(agreement)
+    manifest.write_text(json.dumps(values, indent=2) + '\n', encoding='utf-8')
 
 
 def _write_image_encoder(clip: Bundle, path: Path) -> None:
@@ -246,41 +214,36 @@ def _write_image_encoder(clip: Bundle, path: Path) -> None:
         free_batch(model)
     onnx.save(model, str(path))
     size = clip.manifest.input
-    pixels = np.random.default_rng(0).normal(
-        0.0, 1.0, (_CHECKED_IMAGES, 3, size.height, size.width)
-    )
-    images = pixels.astype(np.float32)
+    shape = (_CHECKED_BATCH, 3, size.height, size.width)
+    images = np.random.default_rng(0).normal(0.0, 1.0, shape).astype(np.float32)
     wanted = [single.run([IMAGE_EMBEDDING], {PIXEL_VALUES: image[None]})[0] for image in images]
+    remedy = 'export CLIP with a free batch axis'
     try:
         (have,) = Session(path).run([IMAGE_EMBEDDING], {PIXEL_VALUES: images})
     except BundleError as error:
         raise BundleError(
             f'{source}: takes one image at a time and could not be changed to take the segments '
-            f'of a frame together ({error}); export CLIP with a free batch axis'
+            f'of a frame together ({error}); {remedy}'
         ) from error
     lengths = np.linalg.norm(wanted, axis=-1).reshape(-1, 1)
-    _compare(path, 'embeddings', have / lengths, np.concatenate(wanted) / lengths, MOST_ERROR)
-
-
-def _write_segmenter(model: Any, path: Path, side_px: int) -> None:
-    with torch.no_grad(), warnings.catch_warnings():
-        # The newer exporter of torch needs one more package and names the axes its own way.
-        warnings.simplefilter('ignore')
-        torch.onnx.export(
-            model,
-            (torch.zeros(1, 3, side_px, side_px),),
-            str(path),
-            dynamo=False,
-            opset_version=OPSET,
-            input_names=[PIXEL_VALUES],
-            output_names=[PREDICTIONS, PROTOTYPES],
+    error_of_unit = float(np.abs(have - np.concatenate(wanted)).max() / lengths.min())
+    if not error_of_unit <= MOST_ERROR:
+        raise BundleError(
+            f'{source}: embeddings of several images differ by {error_of_unit:.2g} from those of '
+            f'single ones where {MOST_ERROR} is allowed; {remedy}'
         )
 
 
-def _write_manifest(stage: Path, name: str, clip: Bundle, checkpoint: Path, side_px: int) -> None:
+def _write_manifest(
+    stage: Path, name: str, clip: Bundle, segmenter: SegmenterSource, precision: str
+) -> None:
     manifest = clip.manifest
     files = {path.name: file_entry(path) for path in sorted(stage.iterdir())}
-    square = {'width': side_px, 'height': side_px, 'resize': 'letterbox'}
+    square: dict[str, Any] = {
+        'width': segmenter.side_px,
+        'height': segmenter.side_px,
+        'resize': 'letterbox',
+    }
     values = {
         'format': FORMAT,
         'name': name,
@@ -297,12 +260,12 @@ def _write_manifest(stage: Path, name: str, clip: Bundle, checkpoint: Path, side
         'logit_scale': manifest.logit_scale,
         'embedding_width': manifest.embedding_width,
         'context_length': manifest.context_length,
-        'precision': manifest.precision,
+        'precision': precision,
         'files': files,
-        'licence': f'AGPL-3.0 (segmenter, through ultralytics); {manifest.licence} (CLIP)',
+        'licence': f'{segmenter.licence}; {manifest.licence} (CLIP)',
         'provenance': (
-            f'{checkpoint.name} (SHA-256 {sha256_of(checkpoint)}) '
-            f'in fp32; CLIP: {manifest.name}, {manifest.provenance}'
+            f'{segmenter.provenance} in {precision}; CLIP in {manifest.precision}: '
+            f'{manifest.name}, {manifest.provenance}'
         ),
         'recommended': {},
     }

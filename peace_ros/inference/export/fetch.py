@@ -8,6 +8,7 @@ import json
 import re
 import urllib.error
 import urllib.request
+from http.client import HTTPException
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urljoin, urlsplit
@@ -26,6 +27,7 @@ _CHUNK_BYTES = 1 << 18
 _TIMEOUT_S = 30.0
 _NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.\-]*')
 _SCHEMES = ('http', 'https', 'file')
+_BROKEN = (HTTPException, ConnectionError, TimeoutError)
 
 
 def fetch_bundle(name: str, index: str, folder: Path, progress: Progress) -> Bundle:
@@ -89,7 +91,7 @@ def _open(url: str, start: int = 0) -> Any:
         return urllib.request.urlopen(request, timeout=_TIMEOUT_S)  # noqa: S310
     except urllib.error.HTTPError as error:
         raise BundleError(f'{url}: the server says {error.code} {error.reason}') from error
-    except (urllib.error.URLError, TimeoutError) as error:
+    except (urllib.error.URLError, *_BROKEN) as error:
         raise BundleError(
             f'{url}: cannot be reached ({error}); check the network and call again, what has come '
             'is kept'
@@ -98,8 +100,18 @@ def _open(url: str, start: int = 0) -> Any:
 
 def _read(url: str) -> bytes:
     with _open(url) as response:
-        content: bytes = response.read()
-    return content
+        return b''.join(iter(lambda: _next_chunk(response, url), b''))
+
+
+def _next_chunk(response: Any, url: str) -> bytes:
+    try:
+        chunk: bytes = response.read(_CHUNK_BYTES)
+    except _BROKEN as error:
+        raise BundleError(
+            f'{url}: the connection broke ({error or type(error).__name__}); call again, the '
+            'download goes on where it stopped'
+        ) from error
+    return chunk
 
 
 def _download(url: str, path: Path, expected: FileEntry, progress: Progress) -> None:
@@ -113,7 +125,7 @@ def _download(url: str, path: Path, expected: FileEntry, progress: Progress) -> 
             goes_on = have > 0 and getattr(response, 'status', None) == 206
             have = have if goes_on else 0
             with path.open('ab' if goes_on else 'wb') as file:
-                while chunk := response.read(_CHUNK_BYTES):
+                while chunk := _next_chunk(response, url):
                     file.write(chunk)
                     have += len(chunk)
                     progress(path.name, have, expected.bytes)

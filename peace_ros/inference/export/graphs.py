@@ -26,8 +26,10 @@ from peace_ros.inference.export.decoder import ClipSegDecoderGraph
 from peace_ros.inference.export.towers import ClipImageTower, ClipSegImageTower, TextTower
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
+
+    Prepare = Callable[[str, nn.Module], nn.Module]
 
 OPSET = 17
 """The first with LayerNormalization, which keeps fp16 from collapsing."""
@@ -36,10 +38,20 @@ _BATCH_AND_LENGTH = {0: 'B', 1: 'L'}
 _PER_TERM = {0: 'T'}
 
 
-def write_clip_graphs(reference: Any, folder: Path, *, side_px: int, end_of_text: int) -> None:
-    """Write image_encoder.onnx and text_encoder.onnx of a CLIP model."""
+def as_it_is(role: str, tower: nn.Module) -> nn.Module:  # noqa: ARG001 - a Prepare
+    """Write a tower without change."""
+    return tower
+
+
+def write_clip_graphs(
+    reference: Any, folder: Path, *, side_px: int, end_of_text: int, prepare: Prepare = as_it_is
+) -> None:
+    """Write image_encoder.onnx and text_encoder.onnx of a CLIP model.
+
+    ``prepare`` takes a role and its tower and returns the tower to write instead.
+    """
     _write(
-        ClipImageTower(reference, side_px),
+        prepare('image_encoder', ClipImageTower(reference, side_px)),
         (torch.zeros(1, 3, side_px, side_px),),
         folder / 'image_encoder.onnx',
         (PIXEL_VALUES,),
@@ -48,18 +60,24 @@ def write_clip_graphs(reference: Any, folder: Path, *, side_px: int, end_of_text
     _write_text(TextTower(reference, end_of_text), folder)
 
 
-def write_clipseg_graphs(reference: Any, folder: Path, *, side_px: int, end_of_text: int) -> None:
-    """Write image_encoder.onnx, text_encoder.onnx and decoder.onnx of a CLIPSeg model."""
+def write_clipseg_graphs(
+    reference: Any, folder: Path, *, side_px: int, end_of_text: int, prepare: Prepare = as_it_is
+) -> None:
+    """Write image_encoder.onnx, text_encoder.onnx and decoder.onnx of a CLIPSeg model.
+
+    ``prepare`` as above; the image encoder comes first.
+    """
     tower = ClipSegImageTower(reference, side_px)
     names = tuple(f'layer_{layer}' for layer in tower.trunk.read_after)
     pixels = torch.zeros(1, 3, side_px, side_px)
-    _write(tower, (pixels,), folder / 'image_encoder.onnx', (PIXEL_VALUES,), names)
+    encoder = prepare('image_encoder', tower)
+    _write(encoder, (pixels,), folder / 'image_encoder.onnx', (PIXEL_VALUES,), names)
     _write_text(TextTower(reference.clip, end_of_text), folder)
     with torch.no_grad():
         features = tower(pixels)
     width = int(reference.config.projection_dim)
     _write(
-        ClipSegDecoderGraph(reference, tower.rows),
+        prepare('decoder', ClipSegDecoderGraph(reference, tower.rows)),
         (*features, torch.zeros(3, width), torch.tensor([1.0, 1.0, 0.0])),
         folder / 'decoder.onnx',
         (*names, TEXT_EMBEDDING, IS_POSITIVE),

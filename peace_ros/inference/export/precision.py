@@ -4,26 +4,20 @@
 
 from __future__ import annotations
 
-import logging
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import onnx
-from onnxruntime.quantization import (
-    CalibrationDataReader,
-    QuantFormat,
-    QuantType,
-    quantize_static,
-)
+from onnx import NodeProto, helper, numpy_helper
 from onnxruntime.transformers.float16 import DEFAULT_OP_BLOCK_LIST, convert_float_to_float16
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
+    from collections.abc import Mapping
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
+    from onnx import GraphProto
 
-    Feeds = Mapping[str, NDArray[np.generic]]
+    from peace_ros.inference.export.activations import Scale
 
 _KEEP_FP32 = ('LayerNormalization', 'Softmax', 'ArgMax')
 """Sums over hundreds of squares overflow in fp16; TensorRT fuses these as they stand."""
@@ -39,65 +33,79 @@ def to_fp16(path: Path) -> None:
     onnx.save(model, str(path))
 
 
-NARROW = ('narrow',)
-EVERY = ('project_in', 'project_out', 'widen', *NARROW)
+MLP = ('widen', 'narrow')
+EVERY = ('project_in', 'project_out', *MLP)
 """Names of the products in :class:`~peace_ros.inference.export.towers.Layer`."""
 
 
-class _Samples(CalibrationDataReader):  # type: ignore[misc]
-    def __init__(self, samples: Iterable[Feeds]) -> None:
-        self._samples = iter(samples)
+def to_int8(path: Path, scales: Mapping[str, Scale]) -> None:
+    """Rewrite a graph: the products that have a scale in int8, static; all else stays fp32.
 
-    def get_next(self) -> Any:
-        return next(self._samples, None)
-
-
-def to_int8(path: Path, samples: Iterable[Feeds], products: Collection[str]) -> None:
-    """Rewrite a graph: the named products inside the transformer layers in int8, static.
-
-    Weights have one scale per output channel; activations one per tensor, measured on samples,
-    symmetric but for those after a ReLU, which spend no bit on a sign. All else stays fp32.
-    Of the decoder only the narrowing product is taken: it is the costliest, and quantising the
-    others, 64 wide, costs most of the agreement. Written as quantise/dequantise pairs, which ONNX
+    Weights get one scale per output channel. Written as quantise/dequantise pairs, which ONNX
     Runtime, OpenVINO and TensorRT all fuse.
+
+    Args:
+        path: of a graph whose nodes are named by the modules they came from.
+        scales: path of the module of a product -> the scale of what enters it.
     """
-    graph = onnx.load(str(path), load_external_data=False).graph
-    constants = {tensor.name for tensor in graph.initializer}
-    wide = [
-        node
-        for node in graph.node
-        if node.op_type == 'MatMul'
-        and '/layers.' in node.name
-        and constants & set(node.input)
-        and node.name.split('/')[-2] in products
+    model = onnx.load(str(path))
+    graph = model.graph
+    constants = {tensor.name: tensor for tensor in graph.initializer}
+    nodes: list[NodeProto] = []
+    for node in graph.node:
+        key = node.name.strip('/').replace('/', '.').removesuffix('.MatMul')
+        if node.op_type == 'MatMul' and key in scales and node.input[1] in constants:
+            nodes += _quantised_input(graph, node, key, scales[key])
+            nodes += _quantised_weights(graph, node, key, constants[node.input[1]])
+        nodes.append(node)
+    del graph.node[:]
+    graph.node.extend(nodes)
+    used = {name for node in nodes for name in node.input}
+    for name, tensor in constants.items():
+        if name not in used:
+            graph.initializer.remove(tensor)
+    onnx.save(model, str(path))
+
+
+def _quantised_input(
+    graph: GraphProto, node: NodeProto, key: str, scale: Scale
+) -> tuple[NodeProto, NodeProto]:
+    kind = np.uint8 if scale.is_unsigned else np.int8
+    parts = [
+        _constant(graph, f'{key}.input_step', np.array(scale.step, np.float32)),
+        _constant(graph, f'{key}.input_zero', np.array(0, kind)),
     ]
-    unsigned = {node.output[0] for node in graph.node if node.op_type == 'Relu'}
-    overrides = {
-        name: [{'quant_type': QuantType.QUInt8, 'symmetric': False}]
-        for node in wide
-        for name in node.input
-        if name in unsigned
-    }
-    source = path.with_suffix('.fp32.onnx')
-    path.rename(source)
-    logging.getLogger().addFilter(_no_advice)
-    try:
-        quantize_static(
-            str(source),
-            str(path),
-            _Samples(samples),
-            quant_format=QuantFormat.QDQ,
-            per_channel=True,
-            activation_type=QuantType.QInt8,
-            weight_type=QuantType.QInt8,
-            op_types_to_quantize=['MatMul'],
-            nodes_to_quantize=[node.name for node in wide],
-            extra_options={'ActivationSymmetric': True, 'TensorQuantOverrides': overrides},
-        )
-    finally:
-        logging.getLogger().removeFilter(_no_advice)
-        source.unlink(missing_ok=True)
+    whole, again = f'{key}.input_int8', f'{key}.input'
+    pair = (
+        helper.make_node('QuantizeLinear', [node.input[0], *parts], [whole], f'{key}.quantise'),
+        helper.make_node('DequantizeLinear', [whole, *parts], [again], f'{key}.dequantise'),
+    )
+    node.input[0] = again
+    return pair
 
 
-def _no_advice(record: logging.LogRecord) -> bool:
-    return 'pre-processing before quantization' not in record.getMessage()
+def _quantised_weights(
+    graph: GraphProto, node: NodeProto, key: str, tensor: onnx.TensorProto
+) -> tuple[NodeProto]:
+    weights = numpy_helper.to_array(tensor)
+    steps = np.maximum(np.abs(weights).max(axis=0), np.finfo(np.float32).tiny) / 127.0
+    whole = np.rint(weights / steps).astype(np.int8)
+    again = f'{key}.weights'
+    back = helper.make_node(
+        'DequantizeLinear',
+        [
+            _constant(graph, f'{key}.weights_int8', whole),
+            _constant(graph, f'{key}.weights_step', steps.astype(np.float32)),
+            _constant(graph, f'{key}.weights_zero', np.zeros(len(steps), np.int8)),
+        ],
+        [again],
+        f'{key}.weights_dequantise',
+        axis=1,
+    )
+    node.input[1] = again
+    return (back,)
+
+
+def _constant(graph: GraphProto, name: str, value: np.ndarray[Any, Any]) -> str:
+    graph.initializer.append(numpy_helper.from_array(value, name))
+    return name

@@ -64,6 +64,8 @@ class Layer(nn.Module):
         self.attention = SelfAttention(reference.self_attn)
         self.norm1 = reference.layer_norm1
         self.norm2 = reference.layer_norm2
+        self.before_widen: nn.Module = nn.Identity()
+        """Set where the input of ``widen`` is to be quantised but also needed as it is."""
         self.widen = reference.mlp.fc1
         self.narrow = reference.mlp.fc2
         self.activation: Activation = reference.mlp.activation_fn
@@ -77,7 +79,8 @@ class Layer(nn.Module):
         return cast('Tensor', self.norm2(x + self._mix(x)))
 
     def _mix(self, x: Tensor) -> Tensor:
-        return cast('Tensor', self.narrow(self.activation(self.widen(x))))
+        wide = self.activation(self.widen(self.before_widen(x)))
+        return cast('Tensor', self.narrow(wide))
 
 
 class VisionTrunk(nn.Module):

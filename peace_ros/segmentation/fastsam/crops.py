@@ -28,7 +28,8 @@ class Cutter:
     def __init__(self, spec: InputSpec, most: int) -> None:
         """Prepare for up to most segments of a frame."""
         self._spec = spec
-        self._tables = normalisation(spec)
+        # 1 x 256 x RGB, as OpenCV takes a table; indexing it by the image would take longer.
+        self._table = np.stack(normalisation(spec), axis=-1)[None]
         self._buffer = np.zeros((most, 3, spec.height, spec.width), np.float32)
 
     def blank(self) -> NDArray[np.float32]:
@@ -75,5 +76,5 @@ class Cutter:
         )
         top, left = (self._spec.height - height) // 2, (self._spec.width - width) // 2
         window = cut[:, top : top + height, left : left + width]
-        for channel, table in enumerate(self._tables):
-            np.multiply(table[scaled[:, :, channel]], shown, out=window[channel])
+        levels = cv2.LUT(scaled, self._table)
+        np.multiply(levels.transpose(2, 0, 1), shown, out=window)

@@ -4,15 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
-from peace_ros.inference import Bundle, TextEncoder, open_sessions
+from peace_ros.inference import Bundle
 from peace_ros.inference.contract import (
     IMAGE_EMBEDDING,
     NEGATIVE,
@@ -30,8 +28,8 @@ from peace_ros.segmentation.fastsam.masks import Segment, assemble
 from peace_ros.segmentation.fastsam.painting import paint
 from peace_ros.segmentation.fastsam.scoring import is_usable, term_shares
 from peace_ros.segmentation.fastsam.selection import Selection, select
-from peace_ros.segmentation.fusion import FUSIONS
-from peace_ros.segmentation.segmenter import SegmentationParameters
+from peace_ros.segmentation.fusion import calibrated
+from peace_ros.segmentation.segmenter import BundleSegmenter, SegmentationParameters
 from peace_ros.segmentation.terms import Terms
 
 
@@ -47,7 +45,7 @@ class _Painted:
     """[1 + N]; the first, of unknown ground, is zero."""
 
 
-class FastSamSegmenter:
+class FastSamSegmenter(BundleSegmenter):
     """A Segmenter over a bundle of the family ``fastsam``."""
 
     def __init__(self, bundle: Bundle, terms: Terms, parameters: SegmentationParameters) -> None:
@@ -69,21 +67,13 @@ class FastSamSegmenter:
                 'the terms share each segment among them: name negative terms or choose clipseg'
             )
         bundle.require_family('fastsam')
-        self._terms = terms
-        self._parameters = parameters
-        self._fusion = FUSIONS[parameters.fusion]
+        super().__init__(bundle, ('segmenter', 'image_encoder', 'text_encoder'), terms, parameters)
         self._logit_scale = bundle.manifest.logit_scale
-        self._sessions = open_sessions(
-            bundle,
-            ('segmenter', 'image_encoder', 'text_encoder'),
-            threads=parameters.threads,
-            providers=parameters.providers,
-        )
-        cache_dir = Path(parameters.cache_dir).expanduser() if parameters.cache_dir else None
-        self._text = TextEncoder(bundle, self._sessions['text_encoder'], cache_dir)
+        self._threshold = _threshold(bundle, parameters.fusion)
         self._letterbox = Letterbox(bundle.manifest.input)
         self._cutter = Cutter(bundle.manifest.encoder_input, parameters.fastsam_max_segments)
         self._warm_up(bundle)
+        self._loaded()
 
     def _warm_up(self, bundle: Bundle) -> None:
         size = bundle.manifest.input
@@ -111,27 +101,10 @@ class FastSamSegmenter:
             )
         return cell_px
 
-    @property
-    def terms(self) -> Terms:
-        """What it looks for."""
-        return self._terms
-
-    @property
-    def unknown_terms(self) -> Mapping[str, tuple[str, ...]]:
-        """Term -> its words that the model has never learned; it cannot see those."""
-        return self._text.unknown_words(self._terms.all)
-
-    @property
-    def calls(self) -> Mapping[str, int]:
-        """Role of a network -> how often it ran, without warm-ups."""
-        return {role: session.calls for role, session in self._sessions.items()}
-
-    def prepare(self, prompt: Prompt) -> None:
-        """Embed the prompt's texts ahead of the frame; may be called from another thread."""
-        self._embeddings(prompt)
-
     def segment(self, frame: Frame, prompt: Prompt) -> Heatmap:
         """Return the safety of each pixel at network resolution, with the frame's stamp.
+
+        0.5 is the score from which the bundle recommends to call ground safe.
 
         Ground that no segment covers, or one that was not scored, is not known to be safe: 0.
 
@@ -139,7 +112,8 @@ class FastSamSegmenter:
         networks that cannot be used.
         """
         painted = self._paint(frame, prompt)
-        return Heatmap(painted.safety[painted.labels], frame.stamp_ns)
+        safety = calibrated(painted.safety, self._threshold)
+        return Heatmap(safety[painted.labels], frame.stamp_ns)
 
     def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
         """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``.
@@ -211,14 +185,20 @@ class FastSamSegmenter:
         return np.clip(fused, np.float32(0.0), np.float32(1.0))
 
     def _embeddings(self, prompt: Prompt) -> NDArray[np.float32]:
-        texts = self._text([prompt.text_for(term) for term in self._terms.all])
+        texts = super()._embeddings(prompt)
         if not is_usable(texts):
             raise self._unusable('text_encoder', 'a text embedding of length zero')
         return texts
 
-    def _unusable(self, role: str, what: str) -> BundleError:
-        path = self._sessions[role].graph.path
-        return BundleError(
-            f'{path}: gave {what}, which cannot be used; the frame gets no heatmap, choose '
-            'another bundle if this stays'
+
+def _threshold(bundle: Bundle, fusion: str) -> float:
+    """Return the bundle's recommendation, which was measured with the sum of positive shares."""
+    if fusion != 'softmax':
+        return 0.5
+    threshold = float(bundle.manifest.recommended.get('threshold', 0.5))
+    if not 0.0 < threshold < 1.0:
+        raise BundleError(
+            f'{bundle.folder / "manifest.json"}: recommended threshold {threshold} must lie '
+            'between 0 and 1, both excluded: correct the manifest or export the bundle anew'
         )
+    return threshold

@@ -7,7 +7,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import http.server
-import importlib.util
 import json
 import threading
 from collections.abc import Iterator
@@ -43,14 +42,8 @@ class RangeHandler(http.server.SimpleHTTPRequestHandler):
 
 
 @pytest.fixture
-def bundle_folder(tmp_path: Path) -> Path:
-    path = Path(__file__).parents[1] / 'tiny_bundles.py'
-    spec = importlib.util.spec_from_file_location('tiny_bundles', path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    folder: Path = module.write_bundle(tmp_path / 'site' / 'v1', 'clip')
+def bundle_folder(tiny: Any, tmp_path: Path) -> Path:
+    folder: Path = tiny.write_bundle(tmp_path / 'site' / 'v1', 'clip')
     digest = hashlib.sha256((folder / 'manifest.json').read_bytes()).hexdigest()
     index = {'clip-tiny': {'url': 'v1', 'sha256': digest}}
     (tmp_path / 'site' / 'index.json').write_text(json.dumps(index))
@@ -116,6 +109,33 @@ def test_a_cut_download_says_to_call_again(
     with pytest.raises(BundleError, match='bytes came; call again, the download goes on there'):
         fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
     assert not (tmp_path / 'here').exists()
+
+
+def test_a_broken_connection_keeps_what_came_and_the_next_call_goes_on(
+    bundle_folder: Path, tmp_path: Path
+) -> None:
+    class BreakingHandler(RangeHandler):
+        def do_GET(self) -> None:
+            if self.path.endswith('text_encoder.onnx') and not self.server.broken:
+                self.server.broken = True
+                content = Path(self.translate_path(self.path)).read_bytes()
+                self.send_response(200)
+                self.send_header('Transfer-Encoding', 'chunked')
+                self.end_headers()
+                self.wfile.write(b'%x\r\n%s\r\n' % (100, content[:100]) + b'40\r\ncut')
+                self.close_connection = True
+                return
+            super().do_GET()
+
+    handler = functools.partial(BreakingHandler, directory=str(bundle_folder.parent))
+    with http.server.ThreadingHTTPServer(('127.0.0.1', 0), handler) as running:
+        running.asked, running.broken = [], False
+        threading.Thread(target=running.serve_forever, daemon=True).start()
+        with pytest.raises(BundleError, match=r'text_encoder.* call again'):
+            fetch_bundle('clip-tiny', url_of(running), tmp_path / 'here', no_progress)
+        assert (tmp_path / '.here.part' / 'manifest.json').is_file()
+        assert fetch_bundle('clip-tiny', url_of(running), tmp_path / 'here', no_progress)
+        running.shutdown()
 
 
 def test_an_unknown_name_lists_those_there_are(server: Any, tmp_path: Path) -> None:

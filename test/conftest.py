@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Small real bundles for the tests of segmentation."""
+"""What several rooms' tests share: small real bundles and a frame."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from peace_ros.domain import Frame
 
 
 def _load_tiny_bundles() -> ModuleType:
-    path = Path(__file__).parents[1] / 'inference' / 'tiny_bundles.py'
+    path = Path(__file__).with_name('tiny_bundles.py')
     spec = importlib.util.spec_from_file_location('tiny_bundles', path)
     assert spec is not None
     assert spec.loader is not None
@@ -33,12 +33,14 @@ def tiny() -> ModuleType:
 
 @pytest.fixture
 def clip_folder(tiny: Any, tmp_path: Path) -> Path:
-    return tiny.write_bundle(tmp_path / 'clip-tiny', 'clip')
+    folder: Path = tiny.write_bundle(tmp_path / 'clip-tiny', 'clip')
+    return folder
 
 
 @pytest.fixture
 def clipseg_folder(tiny: Any, tmp_path: Path) -> Path:
-    return tiny.write_bundle(tmp_path / 'clipseg-tiny', 'clipseg')
+    folder: Path = tiny.write_bundle(tmp_path / 'clipseg-tiny', 'clipseg')
+    return folder
 
 
 @pytest.fixture
