@@ -61,7 +61,9 @@ def _hand_on(verb: Callable[..., Any], context: typer.Context) -> None:
     """Let a verb read its own options from what is left of the command line."""
     own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
     own.command()(verb)
-    own(args=context.args, prog_name=context.command_path, standalone_mode=False)
+    status = own(args=context.args, prog_name=context.command_path, standalone_mode=False)
+    if isinstance(status, int) and status:
+        raise typer.Exit(status)
 
 
 def _status_of(error: PeaceError) -> int:

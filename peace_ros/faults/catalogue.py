@@ -7,10 +7,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from peace_ros.domain import ConfigurationError
-from peace_ros.faults import perception_faults, vehicle_faults
+from peace_ros.faults import link_faults, perception_faults, vehicle_faults, world_faults
 from peace_ros.faults.fault import Fault
 
-FAULTS: tuple[Fault, ...] = (*perception_faults.FAULTS, *vehicle_faults.FAULTS)
+FAULTS: tuple[Fault, ...] = (
+    *perception_faults.FAULTS,
+    *world_faults.FAULTS,
+    *link_faults.FAULTS,
+    *vehicle_faults.FAULTS,
+)
 """The matrix, in the order of the documentation."""
 REPRESENTATIVE = (
     'camera_stops',

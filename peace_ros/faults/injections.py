@@ -213,11 +213,12 @@ def damaged_bundle(folder: Path, *, honest: bool) -> Path:
     shutil.copytree(models_dir() / 'clipseg-small', folder)
     manifest_file = folder / 'manifest.json'
     manifest = json.loads(manifest_file.read_text(encoding='utf-8'))
-    name = manifest['roles']['decoder']
+    name = manifest['roles']['image_encoder']
     data = bytearray((folder / name).read_bytes())
-    # 0xFF in every byte is NaN in fp16 and fp32; the middle of the file is weights.
+    # 0xFF in every byte is NaN in fp16 and fp32; the middle of this file is weights, and a longer
+    # stretch could reach what lies between them.
     middle = len(data) // 2
-    data[middle : middle + 64] = b'\xff' * 64
+    data[middle : middle + 8] = b'\xff' * 8
     (folder / name).write_bytes(data)
     if honest:
         manifest['files'][name]['sha256'] = hashlib.sha256(data).hexdigest()

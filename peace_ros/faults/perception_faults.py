@@ -1,8 +1,10 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Faults of camera, prompt, model, heatmap and of the world below."""
+"""Faults of camera, prompt and model."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from peace_ros.faults import tamper
 from peace_ros.faults.fault import (
@@ -12,24 +14,19 @@ from peace_ros.faults.fault import (
     Expected,
     Fault,
     Injection,
-    Moment,
     Setting,
 )
 from peace_ros.faults.injections import (
     BadBundle,
     BadModel,
     Killed,
-    Person,
     always,
     camera,
-    every_s,
-    heatmap,
     prompt,
 )
 from peace_ros.landing import State
 
 _HOLD = State.HOLD.value
-_LANDING = State.LANDING.value
 _HANDOVER = State.HANDOVER.value
 _STOPS = (_HOLD, *LOOKING_AGAIN)
 """The descent ends, whether the landing calls it missing data or a lost site."""
@@ -83,8 +80,9 @@ CAMERA = (
         'camera',
         'The driver repeats the last picture with new stamps.',
         camera(lambda: tamper.frozen(new_stamps=True)),
-        NO_NEW_HEATMAP,
-        'The same picture from elsewhere is refused: as if the camera had stopped.',
+        replace(NO_NEW_HEATMAP, within_s=3.0, still_within_s=4.2, zero_within_s=3.2),
+        'A picture that does not change while the vehicle moves by 0.5 m is refused: from then on '
+        'as if the camera had stopped.',
     ),
     Fault(
         'camera_black',
@@ -287,132 +285,5 @@ MODEL = (
     ),
 )
 
-HEATMAP = (
-    Fault(
-        'heatmap_stops',
-        'heatmap',
-        'Heatmaps get lost on the way to the landing node.',
-        heatmap(always(tamper.nothing)),
-        NO_NEW_HEATMAP,
-        'As if the camera had stopped.',
-    ),
-    Fault(
-        'heatmap_rare',
-        'heatmap',
-        'One heatmap comes every 3.3 s.',
-        heatmap(every_s(3.3)),
-        Expected(reaches=(_HOLD,), within_s=5.5, recovers=UNDER_WAY, recovers_within_s=15.0),
-        'HOLD whenever the newest one is older than 2 s.',
-        lasts_s=10.0,
-    ),
-    Fault(
-        'heatmap_all_safe',
-        'heatmap',
-        'Every pixel is called surely safe, over safe ground.',
-        heatmap(lambda: tamper.filled(255)),
-        Expected(),
-        'A picture without any contrast is not believed; over ground that is truly safe nothing '
-        'else could be noticed.',
-        lasts_s=15.0,
-    ),
-    Fault(
-        'heatmap_all_safe_over_roofs',
-        'heatmap',
-        'Every pixel is called surely safe, over buildings, while a site is sought.',
-        heatmap(lambda: tamper.filled(255)),
-        Expected(
-            reaches=(_HOLD, State.SEARCHING.value),
-            within_s=3.0,
-            allowed=(State.SEARCHING.value, _HOLD, State.RESTARTING.value),
-        ),
-        'A heatmap without any contrast is not believed: no site is chosen on it.',
-        at=Moment(State.SEARCHING.value),
-        lasts_s=20.0,
-        setting=Setting(world='roofs'),
-    ),
-    Fault(
-        'heatmap_all_unsafe',
-        'heatmap',
-        'Every pixel is called unsafe.',
-        heatmap(lambda: tamper.filled(0)),
-        UNSAFE_HEATMAPS,
-        'The site is lost: WAITING, then CLIMBING to look for another.',
-        lasts_s=8.0,
-    ),
-    Fault(
-        'heatmap_flickers',
-        'heatmap',
-        'Heatmaps are all safe and all unsafe in turn.',
-        heatmap(tamper.flickering),
-        UNSAFE_HEATMAPS,
-        'Unsafe is believed sooner and remembered longer than safe: the site is lost.',
-        lasts_s=8.0,
-    ),
-    Fault(
-        'heatmap_encoding',
-        'heatmap',
-        'Heatmaps come in another encoding.',
-        heatmap(lambda: tamper.of_encoding('rgb8')),
-        NO_NEW_HEATMAP,
-        'They are refused with a sentence: as if the camera had stopped.',
-    ),
-    Fault(
-        'heatmap_cut_short',
-        'heatmap',
-        'Half of the bytes of each heatmap are missing.',
-        heatmap(always(tamper.cut_short)),
-        NO_NEW_HEATMAP,
-        'They are refused with a sentence: as if the camera had stopped.',
-    ),
-    Fault(
-        'heatmap_late',
-        'heatmap',
-        'Heatmaps come 3 s late.',
-        heatmap(lambda: tamper.late(3.0)),
-        NO_NEW_HEATMAP,
-        'Each is too old when it comes: HOLD.',
-    ),
-)
-
-WORLD = (
-    Fault(
-        'person_seen_at_30_m',
-        'world',
-        'At 30 m a person walks to the place below and stays; the model sees them.',
-        Person(seen=True),
-        Expected(reaches=_STOPS, within_s=5.0, still_within_s=7.0),
-        'The ground is unsafe at once: the site is lost, WAITING, then CLIMBING; the place is '
-        'remembered as failed.',
-        at=Moment(below_m=30.0),
-        lasts_s=12.0,
-        note='The heatmap around the person is darkened, whatever the model sees.',
-    ),
-    Fault(
-        'person_painted_at_30_m',
-        'world',
-        'At 30 m a person walks to the place below and stays, painted into the picture.',
-        Person(seen=False),
-        Expected(reaches=_STOPS, within_s=6.0, still_within_s=8.0),
-        'As before, as far as the model sees a person of four pixels (at 30 m).',
-        at=Moment(below_m=30.0),
-        lasts_s=14.0,
-    ),
-    Fault(
-        'every_site_occupied',
-        'world',
-        'A car stands every few metres on all open ground.',
-        camera(always(tamper.untouched)),
-        Expected(
-            reaches=LOOKING_AGAIN,
-            within_s=1.0,
-            allowed=(*LOOKING_AGAIN, _HOLD, State.AIMING.value),
-        ),
-        'There is no safe place: it searches on and does not descend.',
-        at=Moment(State.SEARCHING.value),
-        lasts_s=25.0,
-        setting=Setting(world='crowded'),
-    ),
-)
-
-FAULTS = (*CAMERA, *PROMPT, *MODEL, *HEATMAP, *WORLD)
+FAULTS = (*CAMERA, *PROMPT, *MODEL)
 """In the order of the documentation."""

@@ -35,7 +35,7 @@ class PictureWatch:
         highest = float(safety.max())
         if highest == float(safety.min()):
             # Of one value there is nothing to compare; surely safe everywhere is no place on earth.
-            return EVEN if highest >= 1.0 else ''
+            return EVEN if highest == 1.0 else ''
         if self._first is None or not np.array_equal(safety, self._first[0]):
             self._first = (safety, pose)
             return ''

@@ -14,8 +14,9 @@ from peace_ros.domain import Frame, ImageError
 
 _GRID = 128
 """Pixels looked at along each side; more would not change the answer."""
-_LEAST_SPREAD = 1.5
-"""Standard deviation of brightness, of 255. Fog over a field has 5 and more."""
+_LEAST_SPREAD = 0.5
+"""Standard deviation of brightness, of 255. Fog over a field has 5 and more, the sensor's own noise
+or a lawn seen from the ground more than 1."""
 _MOST_SATURATED = 0.9
 _ASPECT_TOLERANCE = 0.01
 

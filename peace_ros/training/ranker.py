@@ -38,6 +38,15 @@ _PLAIN_WORDS = (
     'blurry', 'foggy', 'mist', 'misty', 'haze', 'hazy', 'snow', 'rain', 'wet', 'dusk', 'dawn',
     'overcast', 'gloomy', 'noisy', 'noise', 'grainy', 'bad', 'clear', 'sharp', 'good',
 )  # fmt: skip
+_LOOKS: dict[str, tuple[str, ...]] = {
+    'blurred': ('blurred',), 'noise': ('noisy',), 'night': ('night', 'dark'),
+    'dark': ('dark', 'night'), 'fog': ('fog',), 'smog': ('smog',), 'rainy': ('rainy',),
+    'snowy': ('snowy',), 'rendered': ('rendered',), '3D': ('rendered',), 'painted': ('rendered',),
+    'evening': ('evening',), 'cloudy': ('cloudy',), 'sunny': ('sunny',), 'bright': ('bright',),
+    'heat-map': ('heat-map',),
+}  # fmt: skip
+"""Look -> what it is called among the words of all categories together."""
+_LOOK_WORDS = ('clear', *dict.fromkeys(word for words in _LOOKS.values() for word in words))
 _PHRASES = (
     '{}', '{}', '{}', 'A {} image', 'a {} photo', 'A {} image.', 'an image in {}', 'A {} view',
     'a photo of {}', 'a {} aerial image', 'it is {}', 'A photo in {}.', 'A {} picture of grass',
@@ -67,7 +76,7 @@ def create_maker(
 
 
 class RankerLoss:
-    """Contrastive loss over the words of each category, several of which may be true."""
+    """Contrastive loss over the words of each category, and of all looks together."""
 
     def __init__(self, seed: int) -> None:
         if not set(_PLAIN_WORDS) <= set(EXTRA_WORDS):
@@ -86,6 +95,7 @@ class RankerLoss:
             ('resolution', RESOLUTION_WORDS),
             ('frame', FRAME_WORDS),
             ('environment', ENVIRONMENT_WORDS + _PLAIN_WORDS),
+            ('look', _LOOK_WORDS),
         ):
             phrase = _PHRASES[int(self._rng.integers(len(_PHRASES)))]
             encoded = self._tokenizer.encode_batch([phrase.format(word) for word in words])
@@ -101,7 +111,12 @@ class RankerLoss:
 def _truth(conditions: list[Condition], name: str, words: tuple[str, ...]) -> Tensor:
     rows = []
     for condition in conditions:
-        true = set(getattr(condition, name))
+        if name == 'look':
+            true = set(_LOOKS.get(condition.name, ()))
+            # A drawn view without a look is neither clear nor anything else for certain.
+            true |= {'clear'} if condition.name == 'plain' and 'clear' in condition.plain else set()
+        else:
+            true = set(getattr(condition, name))
         if name == 'environment':
             true |= set(condition.plain)
         rows.append([float(word in true) for word in words])

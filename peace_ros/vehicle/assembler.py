@@ -245,7 +245,8 @@ class Assembler:
             quaternion_ned_frd=q,
             altitude_agl_m=self._altitude_m(down, q, steady_ns),
         )
-        self._pose_ns = steady_ns
+        # A pose is as old as the older of its parts, or the two limits would add up.
+        self._pose_ns = min(steady_ns, at.steady_ns)
         self.poses.append(self._pose)
 
     def _altitude_m(self, down_m: float, q: Quaternion, steady_ns: int) -> float:

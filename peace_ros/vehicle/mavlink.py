@@ -161,11 +161,13 @@ class MavlinkLink:
     def telemetry(self) -> Telemetry:
         """Return what the autopilot last said."""
         with self._changed:
-            now_ns = time.monotonic_ns()
-            told = self._heard().telemetry(now_ns)
+            heard = self._heard()
+            told = heard.telemetry(time.monotonic_ns())
             if not told.in_control:
-                self._sinking.tell(0.0)
-            self._sinking.take(None if told.pose is None else told.pose.altitude_agl_m, now_ns)
+                self._sinking.forget()
+            altitude_m = None if told.pose is None else told.pose.altitude_agl_m
+            reported_ns = heard.arrived_ns.get(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 0)
+            self._sinking.take(altitude_m, reported_ns)
             return replace(told, pose=None) if self._sinking.problem else told
 
     def take_poses(self) -> list[Pose]:
@@ -215,9 +217,6 @@ class MavlinkLink:
                 Answer.REFUSED,
                 f'{self.telemetry().mode} was chosen after we had control: a person must engage',
             )
-        if by_person:
-            with self._changed:
-                self._sinking.forget()
         if problem := self.position_problem:
             return RequestResult(Answer.REFUSED, problem)
         self._control.ask_anew()

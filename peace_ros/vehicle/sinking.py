@@ -21,6 +21,8 @@ LEAST_M = 1.0
 LEAST_PART = 0.2
 """Of the way that it was told to sink, the altitude has to show this part."""
 GAP_S = 0.5
+STEP_M = 3.0
+"""No vehicle flies this far between two reports."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +54,21 @@ class SinkWatch:
         self._down_m_s = v_down_m_s
 
     def take(self, altitude_m: float | None, steady_ns: int) -> None:
-        """Look at the altitude that is reported now; None is unknown, and proves nothing."""
+        """Look at an altitude; the same report twice is looked at once.
+
+        Args:
+            altitude_m: None is unknown, and proves nothing.
+            steady_ns: When it was reported.
+        """
         at_s = steady_ns / 1e9
         last = self._marks[-1] if self._marks else None
         if altitude_m is None or (last is not None and not 0.0 <= at_s - last.at_s <= GAP_S):
+            self._marks.clear()
+            return
+        if last is not None and at_s == last.at_s:
+            return
+        if last is not None and abs(altitude_m - last.altitude_m) > STEP_M:
+            # A jump has its own watch, and its own answer.
             self._marks.clear()
             return
         if last is not None:

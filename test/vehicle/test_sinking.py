@@ -78,7 +78,23 @@ def test_silence_proves_nothing() -> None:
     assert watch.problem == ''
 
 
-def test_doubt_stays_until_a_person_asks_anew() -> None:
+def test_an_old_report_is_no_altitude_that_stands_still() -> None:
+    watch = SinkWatch()
+    watch.tell(2.0)
+    for step in range(100):
+        watch.take(50.0 - 0.08 * step, round(step * STEP_S * 1e9))
+    for _ in range(100):
+        watch.take(42.08, round(99 * STEP_S * 1e9))
+    assert watch.problem == ''
+
+
+def test_a_jump_is_left_to_others() -> None:
+    watch = SinkWatch()
+    fly(watch, 10.0, lambda _: 2.0, lambda at_s, true_m: true_m + (30.0 if at_s >= 5.0 else 0.0))
+    assert watch.problem == ''
+
+
+def test_doubt_stays_until_somebody_else_flies() -> None:
     watch = SinkWatch()
     fly(watch, 10.0, lambda _: 2.0, lambda _, __: 40.0)
     assert watch.problem
