@@ -4,30 +4,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import cv2
-import torch
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from peace_ros.domain import PeaceError
 from peace_ros.training.recipe import Recipe, run
-
-
-class _Screen:
-    """One progress bar per stage."""
-
-    def __init__(self, progress: Progress) -> None:
-        self._progress = progress
-        self._tasks: dict[str, TaskID] = {}
-
-    def __call__(self, stage: str, share: float, line: str) -> None:
-        if stage not in self._tasks:
-            self._tasks[stage] = self._progress.add_task(stage, total=1.0, line='')
-        self._progress.update(self._tasks[stage], completed=share, line=line)
+from peace_ros.training.screen import show
 
 
 def main(
@@ -47,22 +31,10 @@ def main(
     threads: Annotated[int, typer.Option(help='CPU threads.')] = 2,
 ) -> None:
     """Train the bundled models and write their bundles."""
-    torch.set_num_threads(threads)
-    cv2.setNumThreads(1)
-    columns = (
-        TextColumn('{task.description:>10}'), BarColumn(), TimeElapsedColumn(),
-        TextColumn('{task.fields[line]}'),
-    )  # fmt: skip
     recipe = Recipe(
         out=out, work=work, real=real, minutes=minutes, steps=steps, seed=seed, scenes=scenes
     )
-    console = Console()
-    try:
-        with Progress(*columns, console=console) as progress:
-            run(recipe, _Screen(progress))
-    except PeaceError as error:
-        console.print(f'[red]{error}')
-        raise typer.Exit(1) from error
+    show(partial(run, recipe), threads)
 
 
 if __name__ == '__main__':

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import cv2
 import numpy as np
@@ -21,7 +21,7 @@ from peace_ros.training.textures import gather_materials
 from peace_ros.training.views import sample_view
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
     from torch import Tensor
@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from peace_ros.training.views import View
 
 LABEL_COUNT = len(Label) - 1
+
+
+BatchT = TypeVar('BatchT')
 
 
 def pixel_class_table() -> Tensor:
@@ -128,17 +131,24 @@ class BatchMaker:
             tuple(views),
         )
 
-    def stream(self, first: int, *, threads: int = 2, ahead: int = 4) -> Iterator[Batch]:
+    def stream(self, first: int) -> Iterator[Batch]:
         """Yield batches first, first + 1, ... made ahead of their use."""
-        with ThreadPoolExecutor(threads) as pool:
-            waiting = deque(pool.submit(self.make, first + n) for n in range(ahead))
-            number = first + ahead
-            try:
-                while True:
-                    batch = waiting.popleft().result()
-                    waiting.append(pool.submit(self.make, number))
-                    number += 1
-                    yield batch
-            finally:
-                for future in waiting:
-                    future.cancel()
+        return made_ahead(self.make, first, threads=2, ahead=4)
+
+
+def made_ahead(
+    make: Callable[[int], BatchT], first: int, *, threads: int, ahead: int
+) -> Iterator[BatchT]:
+    """Yield make(first), make(first + 1), ...; so many are in the making while one is used."""
+    with ThreadPoolExecutor(threads) as pool:
+        waiting = deque(pool.submit(make, first + n) for n in range(ahead))
+        number = first + ahead
+        try:
+            while True:
+                batch = waiting.popleft().result()
+                waiting.append(pool.submit(make, number))
+                number += 1
+                yield batch
+        finally:
+            for future in waiting:
+                future.cancel()

@@ -4,17 +4,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import cv2
-import torch
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from peace_ros.domain import PeaceError
 from peace_ros.training.instances.recipe import Recipe, run
+from peace_ros.training.screen import show
 
 
 def main(
@@ -38,30 +35,11 @@ def main(
     threads: Annotated[int, typer.Option(help='CPU threads.')] = 2,
 ) -> None:
     """Train the bundled FastSAM-like model and write its bundle."""
-    torch.set_num_threads(threads)
-    cv2.setNumThreads(1)
-    columns = (
-        TextColumn('{task.description:>10}'), BarColumn(), TimeElapsedColumn(),
-        TextColumn('{task.fields[line]}'),
-    )  # fmt: skip
     recipe = Recipe(
         out=out, work=work, real=real, minutes=minutes, steps=steps, seed=seed,
         start=start, scenes=scenes,
     )  # fmt: skip
-    console = Console()
-    try:
-        with Progress(*columns, console=console) as progress:
-            tasks: dict[str, int] = {}
-
-            def report(stage: str, share: float, line: str) -> None:
-                if stage not in tasks:
-                    tasks[stage] = progress.add_task(stage, total=1.0, line='')
-                progress.update(tasks[stage], completed=share, line=line)  # type: ignore[arg-type]
-
-            run(recipe, report)
-    except PeaceError as error:
-        console.print(f'[red]{error}')
-        raise typer.Exit(1) from error
+    show(partial(run, recipe), threads)
 
 
 if __name__ == '__main__':

@@ -4,10 +4,9 @@
 
 from __future__ import annotations
 
-from collections import deque
-from concurrent.futures import ThreadPoolExecutor
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic
 
 import numpy as np
 import torch
@@ -19,7 +18,7 @@ from peace_ros.segmentation.fastsam.crops import Cutter
 from peace_ros.segmentation.fastsam.letterbox import BORDER_LEVEL
 from peace_ros.training.annotations import PIXEL_CLASS_COUNT
 from peace_ros.training.backbone import MEAN, STD
-from peace_ros.training.batches import pixel_class_table, to_pixels
+from peace_ros.training.batches import BatchT, made_ahead, pixel_class_table, to_pixels
 from peace_ros.training.instances.networks import CROP_PX, INPUT_PX
 from peace_ros.training.instances.targets import (
     Instances,
@@ -85,10 +84,7 @@ class CropBatch:
     """Float32 [T, 9]: labels that each prompt stands for."""
 
 
-BatchT = TypeVar('BatchT')
-
-
-class Maker(Generic[BatchT]):
+class Maker(ABC, Generic[BatchT]):
     """Makes batch n from the seed and n alone, so that a resumed run sees what it would have."""
 
     def __init__(self, sources: list[Source], seed: int, *, batch_size: int, side_px: int) -> None:
@@ -102,24 +98,13 @@ class Maker(Generic[BatchT]):
         self._seed, self._batch_size, self._side_px = seed, batch_size, side_px
         self._materials = gather_materials(sources, np.random.default_rng([seed, 4]))
 
+    @abstractmethod
     def make(self, number: int) -> BatchT:
         """Return batch ``number``."""
-        raise NotImplementedError
 
-    def stream(self, first: int, *, ahead: int = 3) -> Iterator[BatchT]:
+    def stream(self, first: int) -> Iterator[BatchT]:
         """Yield batches first, first + 1, ... made ahead of their use."""
-        with ThreadPoolExecutor(1) as pool:
-            waiting = deque(pool.submit(self.make, first + n) for n in range(ahead))
-            number = first + ahead
-            try:
-                while True:
-                    batch = waiting.popleft().result()
-                    waiting.append(pool.submit(self.make, number))
-                    number += 1
-                    yield batch
-            finally:
-                for future in waiting:
-                    future.cancel()
+        return made_ahead(self.make, first, threads=1, ahead=3)
 
     def _view(self, rng: np.random.Generator) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Return image and classes of a view, at times with the borders of a wide frame."""
