@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from peace_ros.simulation.drawing.grain import structure
 from peace_ros.simulation.drawing.noise import FloatImage, Noise
 from peace_ros.simulation.drawing.palette import Material, Rgb
 from peace_ros.simulation.drawing.plan import Ground, Plan
@@ -120,6 +121,7 @@ def _texture(canvas: Canvas, materials: Sequence[Material], ids: NDArray[np.int1
     gain = contrast[:, 0][ids] * noise.band(4.0, 32.0, 0.5)
     gain += contrast[:, 1][ids] * noise.band(0.5, 2.0, 0.4)
     gain += contrast[:, 2][ids] * noise.band(0.0625, 0.25, 0.2)
+    gain += structure(window, noise, [m.grain for m in materials], ids)
     stripe = np.array([m.stripe for m in materials], np.float32)
     if stripe.any():
         # Stripes narrower than two pixels average away instead of aliasing.

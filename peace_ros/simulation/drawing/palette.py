@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.domain import Label
+from peace_ros.simulation.drawing.grain import Grain, draw_grain
 
 Rgb = tuple[float, float, float]
 """Red, green, blue reflectance as the camera would store it in full sun, 0 to 255."""
+
+_PLAIN = Grain()
 
 SEASONS = ('spring', 'summer', 'autumn', 'winter')
 
@@ -31,6 +34,8 @@ class Material:
     """Wave vector in cycles per metre."""
     stripe: float = 0.0
     """Relative amplitude of the stripes."""
+    grain: Grain = _PLAIN
+    """Structure that is told apart from noise: joints, stones, tufts, ripples."""
 
 
 _G, _B, _P, _W = Label.GRASS, Label.BARE_GROUND, Label.PAVED, Label.WATER
@@ -97,6 +102,8 @@ class Palette:
     def __init__(self, rng: np.random.Generator, season: str) -> None:
         self.season = season
         self._rng = rng
+        # A generator of its own: what grounds are made of does not move what stands on them.
+        self._grain_rng = rng.spawn(1)[0]
         self._dryness = float(rng.beta(1.0, 2.8)) if season in {'summer', 'autumn'} else 0.1
 
     def material(
@@ -117,7 +124,10 @@ class Palette:
         wave = (0.0, 0.0)
         if stripe_m > 0.0:
             wave = (cos(angle_rad) / stripe_m, sin(angle_rad) / stripe_m)
-        return Material(label, _rgb(first * gain), _rgb(second * gain), contrast, wave, stripe)
+        grain = draw_grain(self._grain_rng, kind, label)
+        return Material(
+            label, _rgb(first * gain), _rgb(second * gain), contrast, wave, stripe, grain
+        )
 
     def crown(self) -> tuple[Rgb, str]:
         """Return the colour and kind of a tree."""
