@@ -28,11 +28,24 @@ def main(
         Path, typer.Option(help='Folder of scenes, checkpoints and curves; continues from it.')
     ] = Path('training_run'),
     scenes: Annotated[int, typer.Option(help='Number of drawn scenes.')] = 2000,
+    start: Annotated[
+        Path | None,
+        typer.Option(help='clipseg-small of an earlier training to go on from, not from ImageNet.'),
+    ] = None,
+    ranker: Annotated[bool, typer.Option(help='Train clip-small too.')] = True,
     threads: Annotated[int, typer.Option(help='CPU threads.')] = 2,
 ) -> None:
     """Train the bundled models and write their bundles."""
     recipe = Recipe(
-        out=out, work=work, real=real, minutes=minutes, steps=steps, seed=seed, scenes=scenes
+        out=out,
+        work=work,
+        real=real,
+        minutes=minutes,
+        steps=steps,
+        seed=seed,
+        scenes=scenes,
+        start=start,
+        with_ranker=ranker,
     )
     show(partial(run, recipe), threads)
 

@@ -108,7 +108,7 @@ def paste_person(
 ) -> None:
     """Paste a person seen from above with a cast shadow."""
     radius = rng.uniform(0.22, 0.34) / gsd_m
-    if radius < 0.7:
+    if radius < 0.45:
         return
     height, side = image.shape[:2]
     centre = np.array([rng.uniform(0, side), rng.uniform(0, height)])

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import count, islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, cast
@@ -16,6 +17,7 @@ from peace_ros.training.export import export_ranker, export_segmenter, with_weig
 from peace_ros.training.loop import Budget, train
 from peace_ros.training.measure import SafetyModel, choose_threshold, drawn_examples
 from peace_ros.training.sources import SCENE_PX, load_drawn, load_real
+from peace_ros.training.start import start_from
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +26,11 @@ if TYPE_CHECKING:
     from peace_ros.training.sources import Source
 
 _RANKER_SHARE = 0.12
-"""Of the minutes; the segmenter gets the rest."""
+"""Of the minutes; the segmenter gets the rest, or all when the ranker is left as it is."""
+_FIRST_LOOKS = 12
+"""Batches that tell the norms of a bundle's weights what to expect."""
+_GENTLER = 0.5
+"""Of the learning rate, where the weights are good already."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,10 @@ class Recipe:
     view_px: int = segmenter.VIEW_PX
     scene_px: int = SCENE_PX
     text_steps: int = 600
+    start: Path | None = None
+    """Bundle ``clipseg-small`` of an earlier training to go on from, or none: from ImageNet."""
+    with_ranker: bool = True
+    """Whether ``clip-small`` is trained too."""
 
 
 def run(recipe: Recipe, report: Callable[[str, float, str], None]) -> None:
@@ -66,8 +76,9 @@ def run(recipe: Recipe, report: Callable[[str, float, str], None]) -> None:
         provenance=provenance,
         recommended={'threshold': threshold},
     )
-    clip = _train_ranker(recipe, sources, report)
-    export_ranker(clip, recipe.out / 'clip-small', provenance=provenance, recommended={})
+    if recipe.with_ranker:
+        clip = _train_ranker(recipe, sources, report)
+        export_ranker(clip, recipe.out / 'clip-small', provenance=provenance, recommended={})
 
 
 def _load_sources(recipe: Recipe, report: Callable[[str, float, str], None]) -> list[Source]:
@@ -103,18 +114,23 @@ def _train_segmenter(
     recipe: Recipe, sources: list[Source], report: Callable[[str, float, str], None]
 ) -> Segmenter:
     model = segmenter.create_segmenter(recipe.seed)
-    if not (recipe.work / 'segmenter.pt').exists():
+    maker = segmenter.create_maker(
+        sources, recipe.seed, batch_size=recipe.batch_size, view_px=recipe.view_px
+    )
+    begins = not (recipe.work / 'segmenter.pt').exists()
+    if begins and recipe.start is not None:
+        looks = (maker.make(number).pixels for number in islice(count(1_000_000), _FIRST_LOOKS))
+        start_from(model, recipe.start, looks)
+    elif begins:
         report('text', 0.0, '')
         loss = segmenter.teach_text(model, recipe.seed, recipe.text_steps)
         report('text', 1.0, f'loss {loss:.4f}')
     state = train(
         model,
-        segmenter.create_maker(
-            sources, recipe.seed, batch_size=recipe.batch_size, view_px=recipe.view_px
-        ),
+        maker,
         segmenter.SegmenterLoss(),
-        Budget(recipe.minutes * (1.0 - _RANKER_SHARE), recipe.steps),
-        peak_rate=segmenter.PEAK_RATE,
+        Budget(recipe.minutes * (1.0 - _RANKER_SHARE * recipe.with_ranker), recipe.steps),
+        peak_rate=segmenter.PEAK_RATE * (_GENTLER if recipe.start else 1.0),
         folder=recipe.work,
         name='segmenter',
         report=lambda progress, line: report('segmenter', progress, line),

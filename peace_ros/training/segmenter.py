@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from peace_ros.training.sources import Source
 
-BATCH_SIZE = 12
-VIEW_PX = 256
+BATCH_SIZE = 8
+VIEW_PX = 320
 PROMPTS = 6
 PEAK_RATE = 2e-3
 PRETRAINED = ('encoder.backbone.', 0.25)

@@ -115,3 +115,24 @@ def match_look(
     moved = (lab - own_mean) * gain + mean
     mixed = np.clip(part * moved + (1.0 - part) * lab, 0.0, 255.0).astype(np.uint8)
     return np.ascontiguousarray(cv2.cvtColor(mixed, cv2.COLOR_LAB2RGB), dtype=np.uint8)
+
+
+_TINTS: dict[Label, tuple[float, float, float]] = {
+    Label.GRASS: (12.0, 4.0, 7.0), Label.BARE_GROUND: (14.0, 4.0, 7.0),
+    Label.PAVED: (16.0, 4.0, 6.0), Label.BUILDING: (24.0, 9.0, 10.0), Label.TREE: (12.0, 5.0, 7.0),
+}  # fmt: skip
+"""Spread in CIELAB by which the material of a label may differ from what was drawn."""
+
+
+def tint(
+    image: NDArray[np.uint8], classes: NDArray[np.uint8], rng: np.random.Generator
+) -> NDArray[np.uint8]:
+    """Give the labels of a drawn view other tones: the palette is small, the world is not."""
+    chosen = [label for label in _TINTS if rng.random() < 0.4]
+    if not chosen:
+        return image
+    lab = cv2.cvtColor(image, cv2.COLOR_RGB2LAB).astype(np.float32)
+    for label in chosen:
+        lab[classes == label] += rng.normal(0.0, _TINTS[label]).astype(np.float32)
+    moved = np.clip(lab, 0.0, 255.0).astype(np.uint8)
+    return np.ascontiguousarray(cv2.cvtColor(moved, cv2.COLOR_LAB2RGB), dtype=np.uint8)

@@ -14,7 +14,7 @@ from peace_ros.domain import Label
 from peace_ros.training import pasting
 from peace_ros.training.conditions import Condition, apply, pick_condition
 from peace_ros.training.sources import FRAME_PX
-from peace_ros.training.textures import NO_MATERIALS, Materials, cover, match_look
+from peace_ros.training.textures import NO_MATERIALS, Materials, cover, match_look, tint
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -88,7 +88,7 @@ def _paste(
     sun = np.array([np.cos(azimuth), np.sin(azimuth)]) * reach
     if rng.random() < 0.7:
         pasting.recolour_water(image, classes, rng)
-    if rng.random() < (0.3 if real else 0.2):
+    if rng.random() < (0.4 if real else 0.25):
         pasting.paste_water(image, classes, rng)
     if rng.random() < (0.3 if real else 0.1):
         most = int(np.clip(gsd_m * image.shape[0] / 9.0, 2, 7))
@@ -103,8 +103,9 @@ def _paste(
         most = int(np.clip(gsd_m * image.shape[0] / 5.0, 2, 9))
         for _ in range(int(rng.integers(1, most))):
             pasting.paste_car(image, classes, rng, gsd_m, sun)
-    if rng.random() < 0.5:
-        for _ in range(int(rng.integers(1, 12))):
+    if rng.random() < 0.65:
+        # From high up a view holds more people, and each of them is easier missed.
+        for _ in range(int(rng.integers(1, 12 if gsd_m < 0.1 else 24))):
             seen_from = pasting.paste_person, pasting.paste_standing_person
             seen_from[int(rng.random() < 0.35)](image, classes, rng, gsd_m, sun)
     if rng.random() < 0.15:
@@ -153,8 +154,10 @@ def sample_view(
     """Draw one augmented training view of a source, some of it in materials of real images."""
     image, classes, gsd_m = cut(source, rng, size_px)
     drawn = source.kind == 'drawn'
-    if drawn and rng.random() < 0.5:
-        image = cover(image, classes, rng, materials)
+    if drawn:
+        image = tint(image, classes, rng)
+        if rng.random() < 0.4:
+            image = cover(image, classes, rng, materials)
     _paste(source, image, classes, rng, gsd_m, materials.textures.get(Label.TREE, ()))
     if rng.random() < (0.35 if drawn else 0.1):
         image = match_look(image, rng, materials)

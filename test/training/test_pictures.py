@@ -15,7 +15,7 @@ from peace_ros.training import pasting
 from peace_ros.training.batches import BatchMaker
 from peace_ros.training.degradations import WAYS, degrade
 from peace_ros.training.sources import Source, build_source
-from peace_ros.training.textures import cover, gather_materials, match_look
+from peace_ros.training.textures import cover, gather_materials, match_look, tint
 
 SUN = np.array([0.5, 0.5])
 
@@ -101,3 +101,14 @@ def test_people_are_widened_in_what_training_asks_for() -> None:
             assert (wanted[people] == Label.PERSON).all()
             if people.any():
                 assert (wanted == Label.PERSON).sum() > people.sum()
+
+
+def test_labels_of_a_drawn_view_take_other_tones_each_by_itself() -> None:
+    image = np.full((40, 40, 3), 120, dtype=np.uint8)
+    classes = np.full((40, 40), Label.PAVED, dtype=np.uint8)
+    classes[20:] = Label.PERSON
+    tones = [tint(image, classes, np.random.default_rng(seed)) for seed in range(20)]
+    assert all((each[20:] == 120).all() for each in tones)
+    changed = {tuple(each[0, 0].tolist()) for each in tones}
+    assert len(changed) > 4
+    assert (120, 120, 120) in changed
