@@ -108,7 +108,7 @@ def test_a_second_companion_is_not_believed(flying, eventually):
     line.sendto(beat.pack(voice), ('127.0.0.1', int(sim.url.rpartition(':')[2])))
     assert other.set_mode('LOITER')
     assert eventually(lambda: link.taken_over), 'somebody else chose a mode: it is theirs now'
-    assert link.ignored == before
+    assert eventually(lambda: link.ignored > before), 'the autopilot hands on what others say'
     other.close()
     line.close()
 
