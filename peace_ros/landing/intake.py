@@ -13,7 +13,7 @@ from collections import Counter, deque
 import numpy as np
 
 from peace_ros.domain import Camera, Frame, Heatmap, ImageError, Pose
-from peace_ros.landing.odometry import PositionCarrier, has_position
+from peace_ros.landing.odometry import PositionCarrier
 from peace_ros.landing.parameters import LandingParameters
 from peace_ros.landing.picture_watch import PictureWatch
 from peace_ros.landing.poses import Miss, PoseHistory, jump_m
@@ -61,7 +61,7 @@ class HeatmapIntake:
 
         While north and east are NaN only attitude and altitude are known.
         """
-        if not has_position(pose):
+        if not pose.has_position:
             kept = self._carrier.add_pose(pose)
         else:
             before = self._poses.newest

@@ -69,6 +69,8 @@ class MavlinkSource:
     def _poll(self) -> None:
         link = self._connection.link
         for pose in () if link is None else link.take_poses():
+            if not pose.has_position:
+                continue  # over which ground the vehicle is, nobody knows then
             self._output.publish(pose)
             self._sink(pose)
 

@@ -166,12 +166,14 @@ class MavlinkLink:
             if not told.in_control:
                 self._sinking.forget()
             altitude_m = None if told.pose is None else told.pose.altitude_agl_m
-            reported_ns = heard.arrived_ns.get(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 0)
-            self._sinking.take(altitude_m, reported_ns)
+            self._sinking.take(altitude_m, heard.reported_ns)
             return replace(told, pose=None) if self._sinking.problem else told
 
     def take_poses(self) -> list[Pose]:
-        """Return the poses since the last call, oldest first (at most 256)."""
+        """Return the poses since the last call, oldest first (at most 256).
+
+        While there is no position, north and east are NaN.
+        """
         with self._changed:
             poses = list(self._heard().poses)
             self._heard().poses.clear()
@@ -367,7 +369,10 @@ class MavlinkLink:
             return False
         try:
             self._dialect = choose_dialect(
-                self._wanted_dialect, message.autopilot, self._parameters.hold_mode
+                self._wanted_dialect,
+                message.autopilot,
+                self._parameters.hold_mode,
+                message.type,
             )
         except VehicleError as error:
             self._error = error

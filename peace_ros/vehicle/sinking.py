@@ -53,14 +53,15 @@ class SinkWatch:
         """Note what the vehicle is told from now on; a climb is a negative way."""
         self._down_m_s = v_down_m_s
 
-    def take(self, altitude_m: float | None, steady_ns: int) -> None:
+    def take(self, altitude_m: float | None, reported_ns: int) -> None:
         """Look at an altitude; the same report twice is looked at once.
 
         Args:
             altitude_m: None is unknown, and proves nothing.
-            steady_ns: When it was reported.
+            reported_ns: When it was reported, by the autopilot's clock: that of a simulation may
+                run slower than ours, and a slow descent is no lie then.
         """
-        at_s = steady_ns / 1e9
+        at_s = reported_ns / 1e9
         last = self._marks[-1] if self._marks else None
         if altitude_m is None or (last is not None and not 0.0 <= at_s - last.at_s <= GAP_S):
             self._marks.clear()

@@ -98,6 +98,32 @@ def test_a_bad_line_is_flown_through(flying, eventually):
     assert not link.taken_over
 
 
+@pytest.mark.parametrize('autopilot', ['ardupilot', 'px4'])
+def test_altitude_is_above_home_wherever_the_origin_lies(hovering, eventually, autopilot):
+    with hovering(20.0, 10.0, autopilot=autopilot, origin_above_home_m=-7.0) as sim:
+        link = open_vehicle(sim.url)
+
+        def agrees():
+            pose = link.telemetry().pose
+            return pose is not None and abs(pose.altitude_agl_m - sim.truth().altitude_agl_m) < 0.3
+
+        assert eventually(agrees)
+        link.close()
+
+
+def test_attitude_and_altitude_go_on_when_the_position_is_lost(flying, eventually):
+    sim, link = flying
+    sim.lose_gps()
+    assert eventually(lambda: link.telemetry().pose is None)
+    link.take_poses()
+    assert eventually(lambda: any(not pose.has_position for pose in link.take_poses()))
+    bare = []
+    assert eventually(lambda: bare.extend(link.take_poses()) or len(bare) > 20)
+    assert not any(pose.has_position for pose in bare)
+    assert bare[-1].altitude_agl_m == pytest.approx(sim.truth().altitude_agl_m, abs=1.5)
+    assert [pose.stamp_ns for pose in bare] == sorted({pose.stamp_ns for pose in bare})
+
+
 def test_a_second_companion_is_not_believed(flying, eventually):
     sim, link = flying
     other = open_vehicle(sim.url)
