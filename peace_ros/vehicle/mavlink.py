@@ -64,7 +64,7 @@ class MavlinkLink:
         self._parameters = parameters
         self._clock_ns = clock_ns
         key_file = parameters.signing_key_file
-        signer = Signer.from_file(key_file) if key_file else None
+        signer = Signer.from_file(key_file, parameters.system_id) if key_file else None
         self._wire = Wire(parameters.system_id, signer, datagrams=transport.datagrams)
         self._changed = threading.Condition()
         self._stop = threading.Event()
