@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.domain import Setpoint
 from peace_ros.simulation.autopilot.faults import inject
-from peace_ros.vehicle import SenderState, SetpointSender, open_vehicle
+from peace_ros.vehicle import SenderState, SetpointSender, VehicleParameters, open_vehicle
 from peace_ros.vehicle.dialects import ArduPilot, Px4
 
 
@@ -122,6 +122,31 @@ def test_attitude_and_altitude_go_on_when_the_position_is_lost(flying, eventuall
     assert not any(pose.has_position for pose in bare)
     assert bare[-1].altitude_agl_m == pytest.approx(sim.truth().altitude_agl_m, abs=1.5)
     assert [pose.stamp_ns for pose in bare] == sorted({pose.stamp_ns for pose in bare})
+
+
+@pytest.mark.parametrize('speed', [0.1, 0.7, 4.0])
+def test_a_simulation_slower_or_faster_than_time_is_believed(hovering, eventually, speed):
+    with hovering(20.0, speed) as sim:
+        link = open_vehicle(sim.url, parameters=VehicleParameters(heartbeat_limit_s=20.0))
+        assert eventually(lambda: link.telemetry().pose is not None, 15.0)
+        link.take_poses()
+        begun_ns, high_m = time.monotonic_ns(), sim.truth().altitude_agl_m
+        problems, told, poses = set(), [], []
+        while time.monotonic_ns() - begun_ns < 5e9 and sim.truth().altitude_agl_m > 8.0:
+            link.send_velocity(Setpoint(0, v_down_m_s=1.0))
+            told.append(link.telemetry().pose)
+            problems.add(link.position_problem)
+            poses += link.take_poses()
+            time.sleep(0.04)
+        assert problems == {''}
+        assert None not in told
+        assert sim.truth().altitude_agl_m < high_m - 0.02
+        ages_s = [(time.monotonic_ns() - pose.stamp_ns) / 1e9 for pose in poses]
+        assert ages_s == sorted(ages_s, reverse=True)
+        assert ages_s[-1] < 1.0
+        span_s = (poses[-1].stamp_ns - poses[0].stamp_ns) / 1e9
+        assert span_s == pytest.approx((time.monotonic_ns() - begun_ns) / 1e9, abs=1.0)
+        link.close()
 
 
 def test_a_second_companion_is_not_believed(flying, eventually):
