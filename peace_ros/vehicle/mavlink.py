@@ -318,10 +318,13 @@ class MavlinkLink:
             error = self._error
         self.close()
         refused = f', {self._wire.refused} not rightly signed' if self._wire.refused else ''
+        served = ''
+        if not self._transport.datagrams and not self._bytes_heard:
+            served = '; a TCP port of a simulation serves one client: is another connected'
         raise error or VehicleError(
             f'no HEARTBEAT of an autopilot within {limit_s} s ({self._bytes_heard} bytes heard'
             f'{refused}): check address, port, baud rate and that MAVLink 2 is sent to this line'
-            f'{self._peer.heard_instead()}'
+            f'{served}{self._peer.heard_instead()}'
         )
 
     def _run(self) -> None:

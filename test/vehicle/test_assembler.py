@@ -96,6 +96,15 @@ def test_a_boot_time_that_goes_back_is_a_reboot_and_forgets_the_place(assembler)
     assert assembler.telemetry(0).pose is None
 
 
+def test_a_boot_time_that_runs_over_costs_a_moment_and_no_more(assembler):
+    for at_ms in (2**32 - 40, 2**32 - 10, 20, 50):
+        assembler.take(position(at_ms), 0, 0)
+        assembler.take(attitude(at_ms), 0, 0)
+    assert assembler.reboots == 1
+    assert assembler.late == 0
+    assert assembler.telemetry(0).pose is not None
+
+
 def home(msl_m=0.0, down_m=0.0):
     msl_mm = round(msl_m * 1000)
     return mavlink.MAVLink_home_position_message(0, 0, msl_mm, 0, 0, down_m, [1, 0, 0, 0], 0, 0, 0)

@@ -4,6 +4,7 @@
 
 import math
 import socket
+import threading
 import time
 
 import pytest
@@ -48,6 +49,42 @@ def test_a_mode_that_changed_during_the_silence_is_a_takeover(flying, eventually
     sim.pilot_mode('LOITER')
     inject(sim, 'mend')
     assert eventually(lambda: link.taken_over, 3.0)
+
+
+@pytest.mark.parametrize('mode', ['LOITER', 'BRAKE', 'LAND', 'RTL'])
+def test_a_ground_station_that_takes_over_has_the_last_word(sent, eventually, mode):
+    sim, link, sender = sent
+    station = open_vehicle(sim.url, parameters=VehicleParameters(system_id=255))
+
+    def decides():
+        sender.submit(Setpoint(0, v_north_m_s=1.0))
+
+    def heard_within(seconds):
+        count, last = sim.flight.setpoints, 0.0
+        begun = time.monotonic()
+        while time.monotonic() - begun < seconds:
+            decides()
+            if sim.flight.setpoints != count:
+                count, last = sim.flight.setpoints, time.monotonic() - begun
+            time.sleep(0.002)
+        return last
+
+    assert eventually(lambda: decides() or sim.flight.setpoints > 5)
+    assert station.set_mode('GUIDED'), 'chosen again it changes nothing, and nobody can see it'
+    assert heard_within(0.3) > 0.0
+    assert not link.taken_over
+    asking = threading.Thread(target=station.set_mode, args=(mode,))
+    asking.start()
+    assert eventually(lambda: decides() or sim.mode_name == mode)
+    assert heard_within(1.0) < 0.3
+    asking.join()
+    assert link.taken_over
+    assert not link.request_control()
+    assert sim.mode_name in {mode, 'LAND'}, 'RTL lands at home'
+    assert station.set_mode('GUIDED')
+    assert eventually(lambda: link.telemetry().in_control)
+    assert heard_within(0.5) == 0.0, 'given back is not engaged'
+    station.close()
 
 
 def test_a_reboot_in_flight_is_a_takeover(flying, eventually):
