@@ -166,7 +166,8 @@ class MavlinkLink:
             if not told.in_control:
                 self._sinking.forget()
             altitude_m = None if told.pose is None else told.pose.altitude_agl_m
-            self._sinking.take(altitude_m, heard.reported_ns)
+            reported_ns = heard.arrived_ns.get(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 0)
+            self._sinking.take(altitude_m, reported_ns, heard.reported_ns)
             return replace(told, pose=None) if self._sinking.problem else told
 
     def take_poses(self) -> list[Pose]:

@@ -28,6 +28,7 @@ STEP_M = 3.0
 @dataclass(frozen=True)
 class _Mark:
     at_s: float
+    boot_s: float
     altitude_m: float
     told_m: float
     """Way down that was told since the first mark."""
@@ -53,15 +54,17 @@ class SinkWatch:
         """Note what the vehicle is told from now on; a climb is a negative way."""
         self._down_m_s = v_down_m_s
 
-    def take(self, altitude_m: float | None, reported_ns: int) -> None:
+    def take(self, altitude_m: float | None, steady_ns: int, boot_ns: int | None = None) -> None:
         """Look at an altitude; the same report twice is looked at once.
 
         Args:
             altitude_m: None is unknown, and proves nothing.
-            reported_ns: When it was reported, by the autopilot's clock: that of a simulation may
-                run slower than ours, and a slow descent is no lie then.
+            steady_ns: When it was reported.
+            boot_ns: The same by the autopilot's clock, None: it runs as ours. In a simulation it
+                may run slower, and a slow descent is no lie then.
         """
-        at_s = reported_ns / 1e9
+        at_s = steady_ns / 1e9
+        boot_s = at_s if boot_ns is None else boot_ns / 1e9
         last = self._marks[-1] if self._marks else None
         if altitude_m is None or (last is not None and not 0.0 <= at_s - last.at_s <= GAP_S):
             self._marks.clear()
@@ -73,8 +76,9 @@ class SinkWatch:
             self._marks.clear()
             return
         if last is not None:
-            self._told_m += self._down_m_s * (at_s - last.at_s)
-        self._marks.append(_Mark(at_s, altitude_m, self._told_m))
+            flown_s = min(at_s - last.at_s, max(0.0, boot_s - last.boot_s))
+            self._told_m += self._down_m_s * flown_s
+        self._marks.append(_Mark(at_s, boot_s, altitude_m, self._told_m))
         while at_s - self._marks[0].at_s > SPANS_S[-1] + LAG_S + GAP_S:
             self._marks.popleft()
         for span_s in SPANS_S:
