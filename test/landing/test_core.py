@@ -64,6 +64,26 @@ def test_the_first_state_begins_with_the_first_step_also_on_the_clock_of_the_day
     assert later.time_in_state_s == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize('place', [(-60.0, -40.0), (-12.0, 3.0), (500.0, 0.0), (0.0, -900.0)])
+def test_stands_wherever_it_is_before_anything_was_seen_and_after_the_map_was_dropped(core, place):
+    def there(time_s: float) -> Telemetry:
+        at = replace(pose_at(time_s), north_m=place[0], east_m=place[1])
+        return telemetry_at(time_s, pose=at)
+
+    core.engage()
+    assert core.step(S, there(1.0), 0.1).setpoint.is_zero
+    fed(core, 2.0, 6.0)
+    # The position jumps: the map of before says nothing about the ground here.
+    core.add_pose(there(6.0).pose)
+    decision = core.step(6 * S, there(6.0), 0.1)
+    assert decision.verdict.kind is VerdictKind.NO_ZONE
+    assert decision.setpoint.is_zero
+    # No position for a while drops the map too.
+    decision = core.step(12 * S, there(12.0), 0.1)
+    assert decision.state is State.HOLD
+    assert decision.setpoint.is_zero
+
+
 def test_holds_and_says_why_before_anything_was_seen(core):
     core.engage()
     core.step(S, None, inf)
