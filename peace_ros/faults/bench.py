@@ -200,12 +200,12 @@ class FlightBench:
         self.wait(lambda: bool(self.node.said), 'landing/status', _READY_S)
         self.wait(lambda: self.node.heatmaps >= _READY_HEATMAPS, 'heatmaps', _READY_S)
 
-    def put_vehicle(self) -> None:
-        """Let the vehicle stand in the air at the start."""
+    def put_vehicle(self, north_m: float = 0.0, east_m: float = 0.0) -> None:
+        """Let the vehicle stand in the air, at the start or beside it."""
         deadline = time.monotonic() + _READY_S
         while True:
             try:
-                self.autopilot.inject('place', altitude_m=START_M)
+                self.autopilot.inject('place', north_m=north_m, east_m=east_m, altitude_m=START_M)
             except VehicleError:
                 if time.monotonic() > deadline or self.processes.status('autopilot_sim'):
                     raise
