@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from peace_ros.domain import Camera, Heatmap, Pose, Site, Telemetry
+from peace_ros.domain import Camera, DepthImage, Heatmap, Pose, Site, Telemetry
 from peace_ros.landing import LandingCore, LandingParameters, State, Verdict, VerdictKind
 from peace_ros.landing.guidance import over_site
 from peace_ros.landing.states import STILL_STATES
@@ -82,6 +82,37 @@ def test_stands_wherever_it_is_before_anything_was_seen_and_after_the_map_was_dr
     decision = core.step(12 * S, there(12.0), 0.1)
     assert decision.state is State.HOLD
     assert decision.setpoint.is_zero
+
+
+def depth_at(time_s: float, step_m: float = 0.0) -> DepthImage:
+    depth = np.full((64, 64), 15.0, np.float32)
+    depth[:, 32:] -= step_m
+    return DepthImage(depth, round(time_s * S))
+
+
+def test_depth_waits_for_its_pose_and_closes_the_ground_for_good(core):
+    core.engage()
+    fed(core, 1.0, 6.0)
+    core.add_depth(depth_at(6.1, step_m=3.0))
+    core.add_depth(depth_at(6.1))
+    assert core.step(round(6.0 * S), telemetry_at(6.0), 0.1).counts.get('depth used', 0) == 0
+    core.add_pose(pose_at(6.2))
+    decision = core.step(round(6.2 * S), telemetry_at(6.2), 0.1)
+    assert decision.counts['depth used'] == 1
+    assert decision.counts['depth not newer than the last'] == 1
+    assert core.safety_map.score_around(0.0, 0.0, 1.5, round(6.2 * S))[0] == 0.0
+    assert decision.setpoint.v_down_m_s == 0.0
+    decision = fed(core, 6.4, 9.0)
+    assert decision.setpoint.v_down_m_s == 0.0, 'no heatmap opens it'
+    assert core.safety_map.score_around(0.0, 0.0, 1.5, 9 * S)[0] == 0.0
+
+
+def test_depth_from_a_time_without_a_pose_is_counted_and_left_out(core):
+    fed(core, 1.0, 3.0)
+    core.add_depth(depth_at(0.5, step_m=3.0))
+    decision = fed(core, 3.0, 4.0)
+    assert decision.counts['depth: older than every pose'] == 1
+    assert core.safety_map.score_around(0.0, 0.0, 1.5, 4 * S)[0] > 0.5
 
 
 def test_holds_and_says_why_before_anything_was_seen(core):
