@@ -169,7 +169,8 @@ class MavlinkLink:
             position_m = None if at is None else (at.north_m, at.east_m, -at.altitude_agl_m)
             reported_ns = heard.arrived_ns.get(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 0)
             self._obedience.take(position_m, reported_ns)
-            return replace(told, pose=None) if self._obedience.problem else told
+            problem = self._obedience.problem
+            return replace(told, pose=None, position_problem=problem) if problem else told
 
     def take_poses(self) -> list[Pose]:
         """Return the poses since the last call, oldest first (at most 256)."""

@@ -84,6 +84,16 @@ def test_stands_wherever_it_is_before_anything_was_seen_and_after_the_map_was_dr
     assert decision.setpoint.is_zero
 
 
+def test_says_why_a_position_is_not_believed(core):
+    fed(core, 1.0, 2.0)
+    core.engage()
+    told = telemetry_at(2.0, pose=None, position_problem='the reported position jumped by 20 m')
+    core.step(2 * S, told, 0.1)
+    decision = core.step(round(2.1 * S), told, 0.1)
+    assert decision.state is State.HOLD
+    assert decision.reason == 'the reported position jumped by 20 m'
+
+
 def depth_at(time_s: float, step_m: float = 0.0) -> DepthImage:
     depth = np.full((64, 64), 15.0, np.float32)
     depth[:, 32:] -= step_m
