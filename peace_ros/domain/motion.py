@@ -51,6 +51,9 @@ class Telemetry:
     """The newest STATUSTEXT."""
     battery_remaining: float | None = None
     """Part of the battery that is left, 0 to 1; None where the autopilot does not say."""
+    position_problem: str = ''
+    """Why what it said of its position is not believed; empty while it is, and before it said
+    anything."""
 
 
 @dataclass(frozen=True)

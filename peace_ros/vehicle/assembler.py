@@ -164,13 +164,8 @@ class Assembler:
     def telemetry(self, steady_ns: int) -> Telemetry:
         """Return what is known now; a pose that is too old or not to be believed is None."""
         p = self._parameters
-        pose = self._pose
-        if (
-            pose is None
-            or steady_ns - self._pose_ns > p.pose_limit_s * 1e9
-            or self.position_problem(steady_ns)
-            or self._is_silent(steady_ns)
-        ):
+        pose, problem = self._pose, self._doubt(steady_ns)
+        if pose is None or problem or steady_ns - self._pose_ns > p.pose_limit_s * 1e9:
             pose = None
         at = self._position
         velocity = at.report.velocity_m_s if at and pose else (0.0, 0.0, 0.0)
@@ -178,6 +173,7 @@ class Assembler:
         return Telemetry(
             received_ns=self._received_ns,
             pose=pose,
+            position_problem=problem,
             v_north_m_s=velocity[0],
             v_east_m_s=velocity[1],
             v_down_m_s=velocity[2],
@@ -189,10 +185,13 @@ class Assembler:
             battery_remaining=self._battery,
         )
 
-    def _is_silent(self, steady_ns: int) -> bool:
-        if self._heartbeat_ns is None:
-            return False
-        return self.heartbeat_age_s(steady_ns) > self._parameters.heartbeat_limit_s
+    def _doubt(self, steady_ns: int) -> str:
+        """Return why nothing that was said of the position is believed, empty when it is."""
+        problem = self.position_problem(steady_ns)
+        limit_s, age_s = self._parameters.heartbeat_limit_s, self.heartbeat_age_s(steady_ns)
+        if problem or self._heartbeat_ns is None or age_s <= limit_s:
+            return problem
+        return f'HEARTBEAT is {age_s:.1f} s old, limit {limit_s:g} s: nobody knows who flies'
 
     def _estimator_flags(self, steady_ns: int) -> int | None:
         if self._estimator is None:

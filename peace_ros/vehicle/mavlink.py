@@ -21,12 +21,12 @@ from peace_ros.vehicle.control import Control
 from peace_ros.vehicle.dialects import Dialect, choose_dialect, level_message
 from peace_ros.vehicle.housekeeping import Housekeeping
 from peace_ros.vehicle.lasting import LastingTransport
+from peace_ros.vehicle.obedience import ObedienceWatch
 from peace_ros.vehicle.parameters import VehicleParameters
 from peace_ros.vehicle.peer import Peer
 from peace_ros.vehicle.requests import Requests
 from peace_ros.vehicle.result import Answer, RequestResult
 from peace_ros.vehicle.signing import Signer
-from peace_ros.vehicle.sinking import SinkWatch
 from peace_ros.vehicle.streams import StreamKeeper
 from peace_ros.vehicle.transport import Source
 from peace_ros.vehicle.wire import Wire
@@ -84,7 +84,7 @@ class MavlinkLink:
         self._holding_level = False
         self._bytes_heard = 0
         self._thread = threading.Thread(target=self._run, name='mavlink_link', daemon=True)
-        self._sinking = SinkWatch()
+        self._obedience = ObedienceWatch()
         self._thread.start()
         self._await_autopilot()
 
@@ -117,7 +117,7 @@ class MavlinkLink:
         """Why the autopilot will not obey velocities now, empty when nothing speaks against it."""
         with self._changed:
             found = self._heard().position_problem(time.monotonic_ns())
-            return found or self._sinking.problem
+            return found or self._obedience.problem
 
     @property
     def ignored(self) -> int:
@@ -164,11 +164,13 @@ class MavlinkLink:
             heard = self._heard()
             told = heard.telemetry(time.monotonic_ns())
             if not told.in_control:
-                self._sinking.forget()
-            altitude_m = None if told.pose is None else told.pose.altitude_agl_m
+                self._obedience.forget()
+            at = told.pose
+            position_m = None if at is None else (at.north_m, at.east_m, -at.altitude_agl_m)
             reported_ns = heard.arrived_ns.get(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 0)
-            self._sinking.take(altitude_m, reported_ns, heard.reported_ns)
-            return replace(told, pose=None) if self._sinking.problem else told
+            self._obedience.take(position_m, reported_ns, heard.reported_ns)
+            problem = self._obedience.problem
+            return replace(told, pose=None, position_problem=problem) if problem else told
 
     def take_poses(self) -> list[Pose]:
         """Return the poses since the last call, oldest first (at most 256).
@@ -201,7 +203,7 @@ class MavlinkLink:
                 f'velocity set-point {v} m/s: all components must be finite; nothing was sent'
             )
         self._zero_until_ns = 0
-        self._sinking.tell(setpoint.v_down_m_s)
+        self._obedience.tell(v)
         self._send_setpoint(setpoint)
 
     def send_landing_target(self, site_ned_m: tuple[float, float, float], pose: Pose) -> None:

@@ -179,7 +179,9 @@ def test_nothing_is_believed_of_an_autopilot_whose_heartbeat_is_silent(assembler
         assembler.take(attitude(1000 * second), 0, second * SECOND)
         known = assembler.telemetry(second * SECOND).pose is not None
         assert known == (second < 4), 'its mode may have changed since'
-    assert assembler.telemetry(4 * SECOND).in_control, 'silence is no takeover'
+    told = assembler.telemetry(4 * SECOND)
+    assert told.in_control, 'silence is no takeover'
+    assert 'HEARTBEAT is 4.0 s old' in told.position_problem
 
 
 def test_what_comes_twice_or_late_is_dropped(assembler):
@@ -211,7 +213,7 @@ def test_a_jump_is_not_believed_while_we_fly(assembler):
     assert assembler.poses
     assembler.poses.clear()
     assert jump(assembler) is None
-    assert 'jumped by 20.0 m' in assembler.position_problem(0)
+    assert 'jumped by 20.0 m' in assembler.telemetry(0).position_problem
     assert not assembler.poses, 'the map must not see it either'
     assembler.take(heartbeat(4), 0, 5 * SECOND)
     assembler.take(position(9000), 0, 5 * SECOND)
