@@ -123,6 +123,10 @@ def demo(
         typer.Option(help='Simulated seconds per second; default: 2 if this machine keeps up.'),
     ] = None,
     seed: Annotated[int, typer.Option(help='Seed of the drawn world and of the start.')] = 1,
+    autopilot: Annotated[
+        str | None,
+        typer.Option(metavar='KIND', help='What is simulated: ardupilot (default) or px4.'),
+    ] = None,
     mavlink: Annotated[
         str | None,
         typer.Option(metavar='URL', help='An autopilot that is already there.'),
@@ -156,6 +160,7 @@ def demo(
         config=config,
         speed=speed,
         seed=seed,
+        autopilot=autopilot,
         mavlink=mavlink,
         pose_mavlink=pose_mavlink,
         run_dir=run_dir,

@@ -32,6 +32,8 @@ class Wiring:
     """URL for the camera; None: it follows ``ground_truth/pose`` of our own autopilot."""
     autopilot_port: int | None
     """UDP port of our own autopilot; None: it is not started."""
+    autopilot: str = 'ardupilot'
+    """Which one our own plays."""
 
     @property
     def use_sim_time(self) -> bool:
@@ -45,6 +47,7 @@ def node_arguments(wiring: Wiring) -> Arguments:
     arguments: Arguments = {}
     if wiring.autopilot_port is not None:
         autopilot = {
+            'autopilot': wiring.autopilot,
             'port': wiring.autopilot_port,
             'speed': float(wiring.speed),
             'publish_clock': wiring.use_sim_time,

@@ -15,6 +15,7 @@ from peace_ros.recording.run_folder import create_run_folder
 DEFAULT_TIMEOUT_S = 280.0
 _SPEED_LIMITS = (0.1, 10.0)
 _GSD_LIMITS_M = (0.01, 5.0)
+AUTOPILOTS = ('ardupilot', 'px4')
 _NETWORK_KINDS = ('udp', 'udpin', 'udpout', 'udpbcast', 'tcp', 'tcpin')
 
 
@@ -34,6 +35,8 @@ class DemoOptions:
     speed: float | None = None
     """Simulated seconds per second; None chooses by what the machine can do."""
     seed: int = 1
+    autopilot: str | None = None
+    """Which one our own simulation plays; None: ArduPilot."""
     mavlink: str | None = None
     """URL of an autopilot that is already there."""
     pose_mavlink: str | None = None
@@ -76,6 +79,15 @@ class DemoOptions:
             raise ConfigurationError(f'--labels {self.labels}: no such file; give a label raster')
 
     def _check_vehicle(self) -> None:
+        if self.autopilot not in {None, *AUTOPILOTS}:
+            raise ConfigurationError(
+                f'--autopilot {self.autopilot!r}: choose one of {", ".join(AUTOPILOTS)}'
+            )
+        if self.autopilot is not None and self.mavlink is not None:
+            raise ConfigurationError(
+                f'--autopilot {self.autopilot} with --mavlink: what is connected says itself what '
+                'it is; leave --autopilot out'
+            )
         if (self.mavlink is None) != (self.pose_mavlink is None):
             raise ConfigurationError(
                 '--mavlink and --pose-mavlink belong together: the landing node commands over the '

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 from peace_ros.demo.isolation import free_udp_port, isolate
 from peace_ros.demo.monitor import HEATMAP, IMAGE, STATUS, Monitor
 from peace_ros.demo.nodes import Wiring, node_arguments
-from peace_ros.demo.options import DemoOptions, refuse_to_arm_elsewhere
+from peace_ros.demo.options import DemoOptions
+from peace_ros.demo.piloting import VehicleLine
 from peace_ros.demo.processes import ProcessGroup
 from peace_ros.demo.progress import Progress, Snapshot
 from peace_ros.demo.report import draw_pictures, headline, summary_table
@@ -27,7 +28,6 @@ from peace_ros.nodes.options import CameraOptions
 from peace_ros.recording import BagWriter
 from peace_ros.replay import Preset, load_preset
 from peace_ros.simulation.camera import NadirCamera
-from peace_ros.vehicle import Pilot, open_vehicle
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,13 +38,14 @@ FAST, SLOW = 2.0, 1.0
 LEAST_HEATMAP_HZ = 2.0
 """Heatmaps per simulated second with which the faster speed is kept."""
 _READY_S = 90.0
+_STRANGER_READY_S = 300.0
+"""A given autopilot boots for 42 s of its own clock, which may run slower than ours."""
 _MEASURE_S = 4.0
 _READY_HEATMAPS = 3
-_AIRBORNE_M = 5.0
 _TAIL_S = 1.5
 """Recording goes on for this long after the outcome."""
 _POLL_S = 0.05
-_ENGAGE_S = 15.0
+_ENGAGE_S = 30.0
 
 
 class _TooSlow(Exception):  # noqa: N818 - no error: the demo begins again, slower
@@ -79,7 +80,13 @@ class _Run:
             mavlink=self.options.mavlink or f'udpout:127.0.0.1:{port}',
             pose_mavlink=self.options.pose_mavlink,
             autopilot_port=port,
+            autopilot=self.options.autopilot or 'ardupilot',
         )
+
+    @property
+    def ready_s(self) -> float:
+        """How long the vehicle and its camera may take to be there."""
+        return _READY_S if self.options.own_autopilot else _STRANGER_READY_S
 
 
 def run_demo(options: DemoOptions, console: Console) -> int:
@@ -158,6 +165,9 @@ def _attempt(run: _Run) -> Monitor:
 
 
 def _fly(run: _Run, monitor: Monitor, group: ProcessGroup) -> Ending:
+    def say(text: str) -> None:
+        run.phase = f'pilot: {text}'
+
     arguments = node_arguments(run.wiring)
     landing = arguments.pop('landing')
     for name, given in arguments.items():
@@ -166,11 +176,16 @@ def _fly(run: _Run, monitor: Monitor, group: ProcessGroup) -> Ending:
         # Our own autopilot talks to any number of peers; a given one may know only one URL,
         # which the pilot must have left before the landing node can use it.
         group.start('landing', 'peace_ros.nodes.landing', landing)
-    run.phase = 'waiting for the camera and the networks'
-    _wait(run, monitor, group, lambda: _sees(monitor), 'image and heatmap')
-    if run.measures_speed:
-        _measure_speed(run, monitor, group)
-    _beside(monitor, group, lambda: _pilot(run))
+    with VehicleLine(run.wiring.mavlink) as line:
+        # Before the camera: ArduPilot's own simulation boots when its first port has a client,
+        # and opens the others only then.
+        run.phase = f'waiting for the autopilot at {run.wiring.mavlink}'
+        _beside(monitor, group, line.open)
+        run.phase = 'waiting for the camera and the networks'
+        _wait(run, monitor, group, lambda: _sees(monitor), 'image and heatmap')
+        if run.measures_speed:
+            _measure_speed(run, monitor, group)
+        _beside(monitor, group, lambda: line.bring_up(START_ALTITUDE_M, run.ready_s, say))
     if not run.options.own_autopilot:
         group.start('landing', 'peace_ros.nodes.landing', landing)
     run.phase = 'engaging the landing node'
@@ -197,28 +212,6 @@ def _measure_speed(run: _Run, monitor: Monitor, group: ProcessGroup) -> None:
     heatmap_hz = (monitor.heard(HEATMAP) - begin) / _MEASURE_S / run.speed
     if heatmap_hz < LEAST_HEATMAP_HZ:
         raise _TooSlow(heatmap_hz)
-
-
-def _pilot(run: _Run) -> None:
-    """Bring the vehicle to its start altitude, unless it is in the air already."""
-
-    def say(text: str) -> None:
-        run.phase = f'pilot: {text}'
-
-    url = run.wiring.mavlink
-    link = open_vehicle(url, timeout_s=30.0)
-    try:
-        pilot = Pilot(link, say)
-        pilot.wait_ready()
-        told = link.telemetry()
-        altitude_m = told.pose.altitude_agl_m if told.pose is not None else 0.0
-        if told.armed and not told.landed and altitude_m > _AIRBORNE_M:
-            say(f'in the air already at {altitude_m:.0f} m')
-            return
-        refuse_to_arm_elsewhere(url)
-        pilot.take_off(START_ALTITUDE_M, arm=True)
-    finally:
-        link.close()
 
 
 def _engage(monitor: Monitor) -> None:
@@ -263,13 +256,13 @@ def _wait(
     holds: Callable[[], bool],
     what: str,
 ) -> None:
-    deadline = time.monotonic() + _READY_S
+    deadline = time.monotonic() + run.ready_s
     while not holds():
         group.check()
         monitor.check()
         if time.monotonic() > deadline:
             raise VehicleError(
-                f'{what} did not come within {_READY_S:g} s: see {run.run_dir / "logs"}'
+                f'{what} did not come within {run.ready_s:g} s: see {run.run_dir / "logs"}'
             )
         time.sleep(_POLL_S)
 

@@ -13,13 +13,14 @@ from peace_ros.domain.errors import (
 )
 from peace_ros.domain.labels import SAFE_LABELS, Label, is_safe
 from peace_ros.domain.motion import Pose, Setpoint, Site, Telemetry
-from peace_ros.domain.perception import Camera, Frame, Heatmap, Prompt, RankedWord
+from peace_ros.domain.perception import Camera, DepthImage, Frame, Heatmap, Prompt, RankedWord
 
 __all__ = [
     'SAFE_LABELS',
     'BundleError',
     'Camera',
     'ConfigurationError',
+    'DepthImage',
     'Frame',
     'Heatmap',
     'ImageError',

@@ -9,12 +9,12 @@ Quaternions are (w, x, y, z) and rotate body FRD vectors into local NED.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, isfinite
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Position and attitude at one moment."""
+    """Position and attitude at one moment; north and east are NaN where they are not known."""
 
     stamp_ns: int
     north_m: float
@@ -24,6 +24,11 @@ class Pose:
     quaternion_ned_frd: tuple[float, float, float, float]
     altitude_agl_m: float
     """Above the ground under the vehicle."""
+
+    @property
+    def has_position(self) -> bool:
+        """It tells where the vehicle is, not only its attitude and altitude."""
+        return isfinite(self.north_m) and isfinite(self.east_m)
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,9 @@ class Telemetry:
     """The newest STATUSTEXT."""
     battery_remaining: float | None = None
     """Part of the battery that is left, 0 to 1; None where the autopilot does not say."""
+    position_problem: str = ''
+    """Why what it said of its position is not believed; empty while it is, and before it said
+    anything."""
 
 
 @dataclass(frozen=True)

@@ -119,3 +119,20 @@ class Heatmap:
             raise ImageError(
                 f'heatmap of shape {safety.shape}, {safety.dtype}: give height x width float32'
             )
+
+
+@dataclass(frozen=True)
+class DepthImage:
+    """How far what each pixel shows lies along the axis of the camera."""
+
+    depth_m: NDArray[np.float32]
+    """Height x width; covers the frame. 0, NaN and infinity: nothing was measured."""
+    stamp_ns: int
+    """When the sensor took it, node clock."""
+
+    def __post_init__(self) -> None:
+        depth = self.depth_m
+        if depth.ndim != 2 or depth.dtype != np.float32 or depth.size == 0:
+            raise ImageError(
+                f'depth image of shape {depth.shape}, {depth.dtype}: give height x width float32'
+            )

@@ -200,12 +200,13 @@ class FlightBench:
         self.wait(lambda: bool(self.node.said), 'landing/status', _READY_S)
         self.wait(lambda: self.node.heatmaps >= _READY_HEATMAPS, 'heatmaps', _READY_S)
 
-    def put_vehicle(self) -> None:
-        """Let the vehicle stand in the air at the start."""
+    def put_vehicle(self, north_m: float = 0.0, east_m: float = 0.0) -> None:
+        """Let the vehicle stand in the air, where flights begin or so far beside it."""
+        north_m, east_m = self.ground.begin_m[0] + north_m, self.ground.begin_m[1] + east_m
         deadline = time.monotonic() + _READY_S
         while True:
             try:
-                self.autopilot.inject('place', altitude_m=START_M)
+                self.autopilot.inject('place', north_m=north_m, east_m=east_m, altitude_m=START_M)
             except VehicleError:
                 if time.monotonic() > deadline or self.processes.status('autopilot_sim'):
                     raise
@@ -307,8 +308,8 @@ class FlightBench:
             'world': str(ground.image_file),
             'gsd': float(ground.world.gsd_m),
             'labels': str(ground.label_file),
-            'start_x': ground.start_east_m,
-            'start_y': ground.start_north_m,
+            'start_x': ground.origin_east_m,
+            'start_y': ground.origin_north_m,
             'rate': CAMERA_HZ,
         }
 

@@ -119,6 +119,8 @@ def _matrix(
                 progress.update(task, description=', '.join(under_way) or 'faults')
 
         results = run_faults(chosen, jobs, folder, folder / 'worlds', tell)
+    if results.trouble:
+        console.print(results.trouble, style='red', markup=False, highlight=False)
     told = report.figures(results, time.monotonic() - began)
     if json_file is not None:
         report.write(told, json_file)

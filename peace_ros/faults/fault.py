@@ -28,6 +28,7 @@ LOOKING_AGAIN = (
     State.SEARCHING.value,
 )
 """States of a landing that has lost its site."""
+LEAD_BELOW_M = 45.0
 UNDER_WAY = (State.AIMING.value, State.LANDING.value, State.HANDOVER.value)
 ABSENT = ''
 """In place of a state: the landing node says nothing."""
@@ -84,6 +85,8 @@ class Expected:
     """Processes that end by themselves because of the fault, with a sentence in their log."""
     refuses: bool = False
     """The engagement is refused with a sentence."""
+    over_person_s: float | None = None
+    """The vehicle descends within its safety radius of a person for no longer than this."""
     flies: bool = True
     """The vehicle is held in the air; False where the autopilot itself lets go."""
 
@@ -109,6 +112,8 @@ class Setting:
     """All nodes take their time from ``/clock``."""
     signed: bool = False
     """Companion and autopilot share a key of MAVLink 2 signing."""
+    at_origin: bool = False
+    """The flight begins at the origin of the local frame, where a mirrored position is the same."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +132,8 @@ class Fault:
     lasts_s: float = 5.0
     """The fault ends after this; and earlier when ``until_reached`` and the state is there."""
     until_reached: bool = False
+    lead: Injection | None = None
+    """Brings a landing below 45 m to the state of the moment; it is mended with the fault."""
     setting: Setting = Setting()
     note: str = ''
     """What the test of this fault does not show."""

@@ -9,11 +9,9 @@ from dataclasses import dataclass, field
 from math import isfinite, isnan
 
 from peace_ros.faults.fault import ABSENT, Expected, Fault
-from peace_ros.faults.record import STILL, Record
+from peace_ros.faults.record import STANDING_M_S, STILL, Record
 from peace_ros.landing import State
 
-STANDING_M_S = 0.3
-"""Slower descents than this are standing: the height control of the autopilot breathes."""
 FLOOR_M = 20.0
 OVERSHOOT_M = 1.0
 """The hand-over may be this much too low."""
@@ -98,7 +96,8 @@ def judge(fault: Fault, record: Record) -> Row:
 def wire_figures(record: Record) -> dict[str, float]:
     """Return when the last set-point, and the last one that was not zero, left the companion.
 
-    Only what was sent before the fault ended counts; a key is missing where nothing was.
+    Only what was sent before the fault ended counts; a key is missing where nothing was. With a
+    person below, for how long the vehicle descended over them.
     """
     during = [s for s in record.sent if s.at_s <= record.fault_end_s]
     moving = [s for s in during if not s.is_zero]
@@ -106,6 +105,8 @@ def wire_figures(record: Record) -> dict[str, float]:
     for key, found in (('last_setpoint_s', during), ('last_motion_s', moving)):
         if found:
             figures[key] = round(found[-1].at_s, 3)
+    if record.over_person_s is not None:
+        figures['over_person_s'] = round(record.over_person_s, 2)
     return figures
 
 
@@ -125,6 +126,8 @@ def describe(fault: Fault) -> str:
         parts.append(f'zero on the wire within {e.zero_within_s:g} s')
     if e.silent_within_s is not None:
         parts.append(f'no set-point after {e.silent_within_s:g} s')
+    if e.over_person_s is not None:
+        parts.append(f'descends over the person for {e.over_person_s:g} s at most')
     if e.recovers:
         parts.append(f'afterwards {_names(e.recovers)} within {e.recovers_within_s:g} s')
     if e.stays:
@@ -215,6 +218,16 @@ def _silent(expected: Expected, record: Record) -> Iterator[str]:
     late = [s for s in record.sent if s.at_s > limit_s]
     if late:
         yield (f'{len(late)} set-points after {limit_s:g} s, the last after {late[-1].at_s:.2f} s')
+
+
+def _spares(expected: Expected, record: Record) -> Iterator[str]:
+    limit_s, over_s = expected.over_person_s, record.over_person_s
+    if limit_s is None:
+        return
+    if over_s is None:
+        yield 'nobody walked below'
+    elif over_s > limit_s:
+        yield f'descended over the person for {over_s:.1f} s, {limit_s:g} s allowed'
 
 
 def _recovers(expected: Expected, record: Record) -> Iterator[str]:
@@ -326,7 +339,9 @@ def _nothing_after_abort(_expected: Expected, record: Record) -> Iterator[str]:
         yield f'{len(late)} set-points after ABORTED'
 
 
-_RULES = (_reaches, _allowed, _stands, _zero, _silent, _recovers, _stays, _refuses, _ends)
+_RULES = (
+    *(_reaches, _allowed, _stands, _zero, _silent, _spares, _recovers, _stays, _refuses, _ends),
+)
 """What a fault may ask for."""
 _ALWAYS = (_handovers, _crashes, _hangs, _floor, _zero_means_zero, _nothing_after_abort)
 """What holds whatever goes wrong."""

@@ -11,10 +11,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from peace_ros.faults import line
 from peace_ros.faults.fault import (
     GOING,
-    LOOKING_AGAIN,
     UNDER_WAY,
     Expected,
     Fault,
+    Moment,
     Setting,
 )
 from peace_ros.faults.injections import (
@@ -22,6 +22,7 @@ from peace_ros.faults.injections import (
     BadLine,
     ForgedTelemetry,
     SecondCompanion,
+    Together,
     both_ways,
 )
 from peace_ros.faults.perception_faults import GOES_ON
@@ -34,33 +35,26 @@ _LATER_S = 15.0
 
 NO_POSITION = Expected(
     reaches=(_HOLD,),
-    within_s=1.8,
-    still_within_s=3.5,
-    zero_within_s=2.1,
+    within_s=1.5,
+    still_within_s=3.2,
+    zero_within_s=1.8,
     recovers=UNDER_WAY,
     recovers_within_s=_LATER_S,
 )
 """A pose that is not renewed for 1 s, or cannot be believed, is none."""
 
-NOT_BELIEVED = Expected(
-    reaches=(_HOLD, *LOOKING_AGAIN),
-    within_s=1.6,
-    still_within_s=3.0,
-    recovers=GOING,
-    recovers_within_s=40.0,
-)
-
 JUMPED = Expected(
     reaches=(_HOLD,),
-    within_s=1.6,
-    still_within_s=3.0,
+    within_s=0.8,
+    still_within_s=2.5,
+    zero_within_s=1.0,
     allowed=(State.LANDING.value, _HOLD),
     recovers=GOING,
     recovers_within_s=40.0,
 )
 
 TAKEN_OVER = Expected(
-    reaches=(_ABORTED,), within_s=0.5, silent_within_s=0.5, stays=_ABORTED, flies=False
+    reaches=(_ABORTED,), within_s=0.4, silent_within_s=0.3, stays=_ABORTED, flies=False
 )
 """Somebody else flies: no set-point any more, until a person engages again."""
 
@@ -102,7 +96,14 @@ TELEMETRY = (
         'telemetry',
         'HEARTBEAT stops, everything else goes on.',
         Autopilot('telemetry_stop', {'messages': ['HEARTBEAT']}, undo='telemetry_resume'),
-        Expected(reaches=(_HOLD, _ABORTED), within_s=4.5, still_within_s=6.5, zero_within_s=5.0),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=4.2,
+            still_within_s=5.8,
+            zero_within_s=4.5,
+            recovers=UNDER_WAY,
+            recovers_within_s=_LATER_S,
+        ),
         'After 3.5 s without HEARTBEAT nobody knows who flies: no set-points.',
         lasts_s=8.0,
     ),
@@ -145,7 +146,9 @@ TELEMETRY = (
         'telemetry',
         'The reported altitude does not change any more.',
         Autopilot('altitude', {'kind': 'freeze'}),
-        Expected(reaches=(_HOLD,), within_s=4.5, still_within_s=6.0, stays=_HOLD),
+        Expected(
+            reaches=(_HOLD,), within_s=3.0, still_within_s=4.5, zero_within_s=3.3, stays=_HOLD
+        ),
         'Told to sink, it does not report that it does: HOLD, until a person takes over.',
         lasts_s=12.0,
     ),
@@ -154,7 +157,7 @@ TELEMETRY = (
         'telemetry',
         'The reported position jumps by 20 m to the north.',
         Autopilot('position', {'north_m': 20.0}),
-        NOT_BELIEVED,
+        JUMPED,
         'A position that no flight explains is not believed until it comes back: HOLD.',
     ),
     Fault(
@@ -170,9 +173,34 @@ TELEMETRY = (
         'telemetry',
         'LOCAL_POSITION_NED comes with x and y negated.',
         Autopilot('frame', {'kind': 'south'}),
-        Expected(),
-        'Near the origin nothing shows; farther away the position jumps and is not believed.',
-        lasts_s=12.0,
+        JUMPED,
+        'Away from the origin the position jumps, and is not believed until it comes back: HOLD.',
+    ),
+    Fault(
+        'frame_south_at_origin',
+        'telemetry',
+        'LOCAL_POSITION_NED comes with x and y negated, near the origin and in gusts of 3 m/s.',
+        Together(
+            (
+                Autopilot('wind', {'gust_m_s': 3.0}),
+                Autopilot('frame', {'kind': 'south'}),
+            )
+        ),
+        Expected(reaches=(_HOLD,), within_s=40.0, stays=_HOLD),
+        'Nothing jumps, but correcting by it leads away: told to go one way, the vehicle reports '
+        'the other. HOLD, until a person takes over.',
+        at=Moment(State.SEARCHING.value),
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
+        setting=Setting(at_origin=True),
+    ),
+    Fault(
+        'frame_msl',
+        'telemetry',
+        'LOCAL_POSITION_NED counts its heights from the sea, 35 m lower.',
+        Autopilot('frame', {'kind': 'msl'}),
+        JUMPED,
+        'The altitude jumps, and is not believed until it comes back: HOLD.',
     ),
 )
 
@@ -281,9 +309,10 @@ LINE = (
         'line',
         'Every datagram takes 0.3 s longer.',
         both_ways(lambda: line.late(0.3)),
-        Expected(),
-        'Poses are stamped late; the map is blurred by what the vehicle moves in that time.',
-        lasts_s=15.0,
+        GOES_ON,
+        'TIMESYNC tells when a pose was true: goes on.',
+        lasts_s=_UNTIL_HANDOVER_S,
+        until_reached=True,
     ),
     Fault(
         'second_companion_mode',

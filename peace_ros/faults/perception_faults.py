@@ -28,8 +28,6 @@ from peace_ros.landing import State
 
 _HOLD = State.HOLD.value
 _HANDOVER = State.HANDOVER.value
-_STOPS = (_HOLD, *LOOKING_AGAIN)
-"""The descent ends, whether the landing calls it missing data or a lost site."""
 
 NO_NEW_HEATMAP = Expected(
     reaches=(_HOLD,),
@@ -42,13 +40,13 @@ NO_NEW_HEATMAP = Expected(
 """No heatmap can be used any more: the descent ends at 1.5 s, HOLD follows at 2 s."""
 
 UNSAFE_HEATMAPS = Expected(
-    reaches=_STOPS,
-    within_s=2.5,
-    still_within_s=4.0,
+    reaches=LOOKING_AGAIN,
+    within_s=1.5,
+    still_within_s=3.0,
     recovers=GOING,
     recovers_within_s=40.0,
 )
-"""Heatmaps come and call the ground unsafe, or cannot be believed."""
+"""Heatmaps come and call the ground unsafe: the site is lost at once."""
 
 GOES_ON = Expected(reaches=(_HANDOVER,), within_s=45.0, allowed=GOING)
 """The landing is not disturbed."""
@@ -80,25 +78,21 @@ CAMERA = (
         'camera',
         'The driver repeats the last picture with new stamps.',
         camera(lambda: tamper.frozen(new_stamps=True)),
-        replace(NO_NEW_HEATMAP, within_s=3.0, still_within_s=4.2, zero_within_s=3.2),
+        replace(NO_NEW_HEATMAP, within_s=2.8, still_within_s=3.8, zero_within_s=3.0),
         'A picture that does not change while the vehicle moves by 0.5 m is refused: from then on '
         'as if the camera had stopped.',
     ),
-    Fault(
+    _camera(
         'camera_black',
-        'camera',
         'The picture is black.',
         camera(lambda: tamper.filled(0)),
-        UNSAFE_HEATMAPS,
-        'Nothing safe can be seen: the site is lost or the data are missing; no descent.',
+        'A picture of one colour is refused with a sentence: as if the camera had stopped.',
     ),
-    Fault(
+    _camera(
         'camera_saturates',
-        'camera',
         'The picture is white.',
         camera(lambda: tamper.filled(255)),
-        UNSAFE_HEATMAPS,
-        'Nothing can be seen: the site is lost or the data are missing; no descent.',
+        'A picture of one colour is refused with a sentence: as if the camera had stopped.',
     ),
     Fault(
         'camera_noise',
@@ -221,7 +215,8 @@ MODEL = (
         Expected(
             reaches=(_HOLD,),
             within_s=2.5,
-            zero_within_s=None,
+            still_within_s=3.5,
+            zero_within_s=2.8,
             recovers=UNDER_WAY,
             recovers_within_s=15.0,
         ),
@@ -258,9 +253,10 @@ MODEL = (
         'The segmentation is started again with weights that are no numbers.',
         BadBundle(honest=True),
         Expected(
-            reaches=_STOPS,
+            reaches=(_HOLD,),
             within_s=2.5,
-            still_within_s=4.0,
+            still_within_s=3.5,
+            zero_within_s=2.8,
             recovers=UNDER_WAY,
             recovers_within_s=25.0,
         ),

@@ -10,6 +10,8 @@ from math import hypot, inf, nan
 
 from peace_ros.landing import State
 
+STANDING_M_S = 0.3
+"""Slower descents than this are standing: the height control of the autopilot breathes."""
 _SLOPE_S = 0.3
 """Speeds of the ground truth are taken over this time."""
 
@@ -83,6 +85,8 @@ class Record:
     unsafe: list[tuple[float, str]] = field(default_factory=list)
     """Hand-overs over ground that the truth calls unsafe: when, and why it is."""
     handovers: int = 0
+    over_person_s: float | None = None
+    """How long the vehicle descended with a person below; None where there is none."""
     lost_control_s: float = inf
     """When somebody else than the companion began to fly."""
     trouble: str = ''

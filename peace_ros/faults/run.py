@@ -11,12 +11,14 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import IO, Any
 
 from peace_ros.demo.processes import ProcessError, log_tail
 from peace_ros.faults.fault import Fault
+from peace_ros.faults.judge import judge
+from peace_ros.faults.record import Record
 from peace_ros.faults.worker import read_line
 
 _STOP_S = 20.0
@@ -32,6 +34,8 @@ class Results:
 
     rows: list[Row] = field(default_factory=list)
     gaps_s: list[float] = field(default_factory=list)
+    trouble: str = ''
+    """Why faults are missing, empty when none are."""
 
 
 class _Worker:
@@ -120,15 +124,12 @@ def run_faults(
         world_folder: Prepared worlds.
         tell: Called with a name and None when a fault begins, and with its row when it ends.
 
-    Raises:
-        ProcessError: a worker failed; the rows so far are lost to nobody: ``tell`` had them.
+    A worker that ends or hangs fails its fault and ends the run; the rows so far are kept.
     """
     waiting: queue.SimpleQueue[Fault] = queue.SimpleQueue()
     for fault in faults:
         waiting.put(fault)
     results, lock, stop = Results(), threading.Lock(), threading.Event()
-    failures: list[Exception] = []
-
     # Started from this thread: the kernel ends them when the thread ends that started them.
     workers = [_Worker(n + 1, folder, world_folder) for n in range(min(jobs, len(faults)))]
 
@@ -137,16 +138,16 @@ def run_faults(
             while not stop.is_set():
                 fault = waiting.get_nowait()
                 tell(fault.name, None)
-                told = worker.run(fault, stop)
+                told = _run(worker, fault, stop)
                 with lock:
                     results.rows.append(told['row'])
                     results.gaps_s.extend(told['gaps_s'])
+                    results.trouble = results.trouble or told.get('trouble', '')
                 tell(fault.name, told['row'])
+                if results.trouble:
+                    stop.set()
         except queue.Empty:
             return
-        except (ProcessError, OSError) as error:
-            failures.append(error)
-            stop.set()
 
     threads = [threading.Thread(target=work, args=(each,), daemon=True) for each in workers]
     try:
@@ -158,6 +159,13 @@ def run_faults(
         stop.set()
         for each in workers:
             each.close()
-    if failures:
-        raise failures[0]
     return results
+
+
+def _run(worker: _Worker, fault: Fault, stop: threading.Event) -> dict[str, Any]:
+    """Run a fault; when the worker fails, that is the fault's result."""
+    try:
+        return worker.run(fault, stop)
+    except (ProcessError, OSError) as error:
+        row = judge(fault, Record(trouble=str(error)))
+        return {'row': asdict(replace(row, hangs=1)), 'gaps_s': [], 'trouble': str(error)}

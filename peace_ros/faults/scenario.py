@@ -11,8 +11,8 @@ from itertools import pairwise
 from peace_ros.demo.truth import judge as judge_ground
 from peace_ros.domain import PeaceError
 from peace_ros.faults.bench import FlightBench
-from peace_ros.faults.fault import ABSENT, Fault
-from peace_ros.faults.record import Record, Said, Sent
+from peace_ros.faults.fault import ABSENT, LEAD_BELOW_M, Fault, Moment
+from peace_ros.faults.record import STANDING_M_S, Record, Said, Sent
 from peace_ros.faults.walker import Walker
 from peace_ros.landing import LandingParameters, State
 from peace_ros.nodes.options import CameraOptions
@@ -59,15 +59,19 @@ class Scenario:
         else:
             self.bench.engage()
             self.engaged_s = time.monotonic()
-            self._await_moment()
+            if self.fault.lead is not None:
+                self._await_moment(Moment(below_m=LEAD_BELOW_M))
+                self.fault.lead.begin(self.bench)
+            self._await_moment(self.fault.at)
             self._inject()
             self._watch_fault()
+        if self.fault.lead is not None:
+            self.fault.lead.end(self.bench)
         self.fault.injection.end(self.bench)
         self.record.ended_s = time.monotonic() - self.injected_s
         self._watch_recovery()
 
-    def _await_moment(self) -> None:
-        at = self.fault.at
+    def _await_moment(self, at: Moment) -> None:
         deadline = time.monotonic() + _MOMENT_S
         while not self._is_moment(at.state, at.below_m):
             self.bench.look()
@@ -155,12 +159,26 @@ class Scenario:
         aborted = record.first((State.ABORTED.value,))
         if aborted is not None:
             record.lost_control_s = aborted.at_s
-        self._judge_handovers()
+        walker = getattr(self.fault.injection, 'walker', None)
+        self._judge_handovers(walker)
+        if walker is not None:
+            self._watch_person(walker)
 
-    def _judge_handovers(self) -> None:
+    def _watch_person(self, walker: Walker) -> None:
+        """Note for how long the vehicle descended with the person below."""
+        radius_m = LandingParameters().safety_radius_m
+        record, before_s, over_s = self.record, 0.0, 0.0
+        for at_s, speed in record.descents(0.0, record.closed_s):
+            pose = self.bench.node.pose_near(at_s + self.injected_s)
+            beside = pose is None or walker.distance_m(pose, pose.stamp_ns) > radius_m
+            if speed > STANDING_M_S and not beside:
+                over_s += at_s - before_s
+            before_s = at_s
+        record.over_person_s = over_s
+
+    def _judge_handovers(self, walker: Walker | None) -> None:
         record = self.record
         camera = NadirCamera(self.bench.ground.world, CameraOptions().camera)
-        walker = getattr(self.fault.injection, 'walker', None)
         last = ''
         for said in record.said:
             if said.state == State.HANDOVER.value and last != said.state:

@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
+from peace_ros.faults import tamper
 from peace_ros.faults.fault import (
     GOING,
-    LOOKING_AGAIN,
     UNDER_WAY,
     Expected,
     Fault,
+    Injection,
     Moment,
     Setting,
 )
@@ -20,6 +21,8 @@ from peace_ros.faults.injections import (
     Killed,
     Stalled,
     Suspended,
+    always,
+    heatmap,
 )
 from peace_ros.faults.link_faults import TAKEN_OVER
 from peace_ros.faults.perception_faults import NO_NEW_HEATMAP
@@ -66,8 +69,10 @@ AUTOPILOT = (
         'autopilot',
         'The autopilot restarts in flight and comes up in another mode.',
         Autopilot('reboot', undo=''),
-        Expected(reaches=(_ABORTED, _HOLD), within_s=1.6, silent_within_s=1.9, flies=False),
-        'Another mode is a take-over; without a position it holds.',
+        Expected(
+            reaches=(_ABORTED,), within_s=1.6, silent_within_s=1.9, stays=_ABORTED, flies=False
+        ),
+        'Another mode is a take-over: ABORTED.',
     ),
     Fault(
         'autopilot_refuses',
@@ -84,16 +89,47 @@ AUTOPILOT = (
         'autopilot',
         'GNSS is lost; the position stops.',
         Autopilot('gps_loss', undo='gps_restore'),
-        Expected(reaches=(_HOLD,), within_s=1.6, still_within_s=3.5, zero_within_s=1.9),
-        'HOLD; 7.4 s later the failsafe of the autopilot lands: ABORTED.',
+        Expected(
+            reaches=(_HOLD,),
+            within_s=1.6,
+            still_within_s=3.5,
+            zero_within_s=1.9,
+            recovers=UNDER_WAY,
+            recovers_within_s=15.0,
+        ),
+        'HOLD; goes on when the position is back before the autopilot gives up.',
         lasts_s=6.0,
+    ),
+    Fault(
+        'gnss_lost_for_good',
+        'autopilot',
+        'GNSS is lost; 7.4 s later the failsafe of the autopilot lands.',
+        Autopilot('gps_loss', undo=''),
+        Expected(
+            reaches=(_ABORTED,),
+            within_s=8.5,
+            allowed=(State.LANDING.value, _HOLD, _ABORTED),
+            zero_within_s=1.9,
+            silent_within_s=8.5,
+            stays=_ABORTED,
+            flies=False,
+        ),
+        'HOLD; ABORTED when the autopilot lands by itself.',
+        lasts_s=10.0,
     ),
     Fault(
         'gnss_lost_position_stale',
         'autopilot',
         'GNSS is lost; the autopilot repeats the last position.',
         Autopilot('gps_loss', {'stale': True}, undo='gps_restore'),
-        Expected(reaches=(_HOLD,), within_s=4.5, still_within_s=5.5),
+        Expected(
+            reaches=(_HOLD,),
+            within_s=3.0,
+            still_within_s=4.5,
+            zero_within_s=3.3,
+            recovers=UNDER_WAY,
+            recovers_within_s=15.0,
+        ),
         'The speed and the position that are reported disagree: HOLD.',
         lasts_s=6.5,
     ),
@@ -111,7 +147,9 @@ AUTOPILOT = (
         'autopilot',
         'The motors are stopped in flight.',
         Autopilot('disarm', undo=''),
-        Expected(reaches=(_ABORTED, _HOLD), within_s=1.6, silent_within_s=1.9, flies=False),
+        Expected(
+            reaches=(_ABORTED,), within_s=1.6, silent_within_s=1.9, stays=_ABORTED, flies=False
+        ),
         'Disarmed is a take-over: ABORTED.',
         lasts_s=3.0,
     ),
@@ -136,7 +174,7 @@ _RESTARTED = Expected(
 )
 
 
-def _killed(state: State) -> Fault:
+def _killed(state: State, lead: Injection | None = None) -> Fault:
     return Fault(
         f'landing_killed_{state.value.lower()}',
         'process',
@@ -147,14 +185,22 @@ def _killed(state: State) -> Fault:
         'moves nothing until a person engages.',
         at=Moment(state.value),
         lasts_s=7.0,
+        lead=lead,
     )
+
+
+_ALL_UNSAFE = heatmap(lambda: tamper.filled(0))
 
 
 PROCESS = (
     _killed(State.SEARCHING),
     _killed(State.AIMING),
     _killed(State.LANDING),
+    _killed(State.WAITING, _ALL_UNSAFE),
+    _killed(State.CLIMBING, _ALL_UNSAFE),
+    _killed(State.RESTARTING, _ALL_UNSAFE),
     _killed(State.HANDOVER),
+    _killed(State.HOLD, heatmap(always(tamper.nothing))),
     Fault(
         'segmentation_killed',
         'process',
@@ -227,7 +273,7 @@ PROCESS = (
         'A callback keeps the executor of the landing node for 2 s.',
         Stalled(2.0),
         Expected(
-            zero_within_s=0.75,
+            zero_within_s=0.6,
             recovers=(_HOLD, *GOING),
             recovers_within_s=5.0,
         ),
@@ -241,7 +287,7 @@ PROCESS = (
         'A callback keeps the executor of the landing node for 5 s.',
         Stalled(5.0),
         Expected(
-            zero_within_s=0.75,
+            zero_within_s=0.6,
             still_within_s=2.6,
             recovers=(_ABORTED,),
             recovers_within_s=3.0,
@@ -277,9 +323,7 @@ CLOCK = (
         'clock',
         'The clock of all nodes steps 30 s ahead.',
         ClockStep(30.0),
-        Expected(
-            reaches=(_HOLD, *LOOKING_AGAIN), within_s=1.0, recovers=GOING, recovers_within_s=20.0
-        ),
+        Expected(reaches=(_HOLD,), within_s=1.0, recovers=UNDER_WAY, recovers_within_s=20.0),
         'Everything known is old at once: HOLD, until the map is new.',
         setting=_SIM_TIME,
     ),
@@ -288,9 +332,7 @@ CLOCK = (
         'clock',
         'The clock of all nodes steps 30 s back.',
         ClockStep(-30.0),
-        Expected(
-            reaches=(_HOLD, *LOOKING_AGAIN), within_s=1.0, recovers=GOING, recovers_within_s=20.0
-        ),
+        Expected(reaches=(_HOLD,), within_s=1.0, recovers=UNDER_WAY, recovers_within_s=20.0),
         'What lies in the future is worthless: the map is dropped and begun anew.',
         setting=_SIM_TIME,
     ),

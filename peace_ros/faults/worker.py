@@ -70,7 +70,8 @@ class Worker:
             bench = None
         if bench is None:
             self._count += 1
-            ground = worlds.load(self._world_folder, setting.world)
+            begin_m = (0.0, 0.0) if setting.at_origin else worlds.BEGIN_M
+            ground = worlds.load(self._world_folder, setting.world, begin_m)
             folder = self._folder / f'bench-{self._count}'
             bench = self._bench = FlightBench(setting, ground, folder, self._node)
             bench.open()

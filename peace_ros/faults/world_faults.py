@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from peace_ros.faults import tamper
 from peace_ros.faults.fault import (
     LOOKING_AGAIN,
@@ -42,8 +44,15 @@ HEATMAP = (
         'heatmap',
         'One heatmap comes every 3.3 s.',
         heatmap(every_s(3.3)),
-        Expected(reaches=(_HOLD,), within_s=5.5, recovers=UNDER_WAY, recovers_within_s=15.0),
-        'HOLD whenever the newest one is older than 2 s.',
+        Expected(
+            reaches=(_HOLD,),
+            within_s=2.8,
+            still_within_s=3.6,
+            zero_within_s=3.0,
+            recovers=UNDER_WAY,
+            recovers_within_s=15.0,
+        ),
+        'HOLD whenever the newest one is older than 2 s; never descends on such a map.',
         lasts_s=10.0,
     ),
     Fault(
@@ -51,10 +60,9 @@ HEATMAP = (
         'heatmap',
         'Every pixel is called surely safe, over safe ground.',
         heatmap(lambda: tamper.filled(255)),
-        Expected(),
-        'A picture without any contrast is not believed; over ground that is truly safe nothing '
-        'else could be noticed.',
-        lasts_s=15.0,
+        NO_NEW_HEATMAP,
+        'A heatmap without any contrast is not believed: as if the camera had stopped.',
+        lasts_s=8.0,
     ),
     Fault(
         'heatmap_all_safe_over_roofs',
@@ -62,9 +70,10 @@ HEATMAP = (
         'Every pixel is called surely safe, over buildings, while a site is sought.',
         heatmap(lambda: tamper.filled(255)),
         Expected(
-            reaches=(_HOLD, State.SEARCHING.value),
-            within_s=3.0,
-            allowed=(State.SEARCHING.value, _HOLD, State.RESTARTING.value),
+            reaches=(_HOLD,),
+            within_s=2.8,
+            allowed=(State.SEARCHING.value, _HOLD),
+            still_within_s=1.0,
         ),
         'A heatmap without any contrast is not believed: no site is chosen on it.',
         at=Moment(State.SEARCHING.value),
@@ -124,7 +133,7 @@ WORLD = (
         'world',
         'At 30 m a person walks to the place below and stays; the model sees them.',
         Person(seen=True),
-        _PERSON,
+        replace(_PERSON, over_person_s=1.5),
         'The ground is closed at once: the site moves away from the person, or is lost; never a '
         'hand-over above them.',
         at=Moment(below_m=30.0),
@@ -150,6 +159,7 @@ WORLD = (
             reaches=LOOKING_AGAIN,
             within_s=1.0,
             allowed=(*LOOKING_AGAIN, _HOLD, State.AIMING.value),
+            still_within_s=1.0,
         ),
         'There is no safe place: it searches on and does not descend.',
         at=Moment(State.SEARCHING.value),

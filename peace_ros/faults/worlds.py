@@ -22,6 +22,8 @@ SEED = 2
 SIZE_M = 240.0
 GSD_M = 0.1
 WORLDS = ('meadow', 'crowded', 'roofs')
+BEGIN_M = (-24.0, -17.0)
+"""North and east of the local origin, where a flight begins: at the origin errors of sign hide."""
 _MARGIN_M = 40.0
 """The camera sees 37 m to each side from 50 m: the start keeps so far from the edge."""
 _SPACING_M = 5.0
@@ -34,12 +36,14 @@ class Ground:
     """One world with its files and the start, which is the local origin."""
 
     world: World
-    """Its centre is placed so that the start is the local origin."""
+    """Its centre is placed so that flights begin over the ground that was looked for."""
     image_file: Path
     label_file: Path
-    start_east_m: float
-    """Of the centre of the world."""
-    start_north_m: float
+    origin_east_m: float
+    """Of the local frame, from the centre of the world."""
+    origin_north_m: float
+    begin_m: tuple[float, float]
+    """North and east in the local frame."""
 
 
 def prepare(folder: Path) -> None:
@@ -60,8 +64,8 @@ def prepare(folder: Path) -> None:
             save_picture(world.labels, label_file)
 
 
-def load(folder: Path, name: str) -> Ground:
-    """Return a world of a prepared folder.
+def load(folder: Path, name: str, begin_m: tuple[float, float] = BEGIN_M) -> Ground:
+    """Return a world of a prepared folder, for flights that begin there in the local frame.
 
     Raises:
         ConfigurationError: there is no world of that name.
@@ -74,8 +78,9 @@ def load(folder: Path, name: str) -> Ground:
     # The crowded world begins where the meadow was.
     reference = load_world(_files(folder, 'meadow')[0], GSD_M, _files(folder, 'meadow')[1])
     north_m, east_m = _start(reference, over_safe_ground=name != 'roofs')
-    placed = replace(world, centre_east_m=-east_m, centre_north_m=-north_m)
-    return Ground(placed, image_file, label_file, east_m, north_m)
+    origin_north_m, origin_east_m = north_m - begin_m[0], east_m - begin_m[1]
+    placed = replace(world, centre_east_m=-origin_east_m, centre_north_m=-origin_north_m)
+    return Ground(placed, image_file, label_file, origin_east_m, origin_north_m, begin_m)
 
 
 def crowded(world: World) -> World:

@@ -7,7 +7,7 @@ The order of a step is that of responsibility: data, site, state, guidance, guar
 
 from __future__ import annotations
 
-from peace_ros.domain import Camera, Frame, Heatmap, Pose, Telemetry
+from peace_ros.domain import Camera, DepthImage, Frame, Heatmap, Pose, Telemetry
 from peace_ros.landing.decision import Decision
 from peace_ros.landing.helm import Command, Helm
 from peace_ros.landing.intake import HeatmapIntake
@@ -53,6 +53,10 @@ class LandingCore:
     def add_heatmap(self, heatmap: Heatmap) -> None:
         """Put a heatmap into the map with the pose at its stamp, or count why not."""
         self._intake.add_heatmap(heatmap)
+
+    def add_depth(self, depth: DepthImage) -> None:
+        """Let a depth image close ground that is not flat; optional, and it opens nothing."""
+        self._intake.add_depth(depth)
 
     def add_view(self, frame: Frame) -> None:
         """Keep the picture of a frame, which carries the map on while no position is known."""

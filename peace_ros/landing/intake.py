@@ -12,8 +12,8 @@ from collections import Counter, deque
 
 import numpy as np
 
-from peace_ros.domain import Camera, Frame, Heatmap, ImageError, Pose
-from peace_ros.landing.odometry import PositionCarrier, has_position
+from peace_ros.domain import Camera, DepthImage, Frame, Heatmap, ImageError, Pose
+from peace_ros.landing.odometry import PositionCarrier
 from peace_ros.landing.parameters import LandingParameters
 from peace_ros.landing.picture_watch import PictureWatch
 from peace_ros.landing.poses import Miss, PoseHistory, jump_m
@@ -35,6 +35,8 @@ class HeatmapIntake:
         self._carrier = PositionCarrier(camera, parameters.pose_gap_limit_s, safety_map)
         self._pictures = PictureWatch()
         self._pending: deque[Heatmap] = deque()
+        self._depths: deque[DepthImage] = deque(maxlen=_PENDING_LIMIT)
+        self._newest_depth_ns = -1
         self._waiting_since_ns: dict[int, int] = {}
         self._clock_ns: int | None = None
         self.counts: Counter[str] = Counter()
@@ -53,6 +55,8 @@ class HeatmapIntake:
         self._poses.clear()
         self._carrier.clear()
         self._pending.clear()
+        self._depths.clear()
+        self._newest_depth_ns = -1
         self._waiting_since_ns.clear()
         self._clock_ns = None
 
@@ -61,7 +65,7 @@ class HeatmapIntake:
 
         While north and east are NaN only attitude and altitude are known.
         """
-        if not has_position(pose):
+        if not pose.has_position:
             kept = self._carrier.add_pose(pose)
         else:
             before = self._poses.newest
@@ -112,6 +116,15 @@ class HeatmapIntake:
                 self._drop('overtaken while it waited for a pose')
             self._settle()
 
+    def add_depth(self, depth: DepthImage) -> None:
+        """Use a depth image, or let it wait for its pose; the oldest waits in vain."""
+        if depth.stamp_ns <= self._newest_depth_ns:
+            self.counts['depth not newer than the last'] += 1
+            return
+        self._newest_depth_ns = depth.stamp_ns
+        self._depths.append(depth)
+        self._settle()
+
     def tick(self, now_ns: int) -> None:
         """Tell the time: heatmaps that have waited too long, or that lie ahead, are rejected."""
         self._clock_ns = now_ns
@@ -149,6 +162,7 @@ class HeatmapIntake:
         if lost:
             self._drop_map(lost)
             self._poses.clear()
+        self._settle_depths()
         while self._pending:
             pose = self._pose_at(self._pending[0].stamp_ns)
             if pose is Miss.NOT_YET:
@@ -171,6 +185,22 @@ class HeatmapIntake:
             else:
                 self.counts['used'] += 1
                 self._drop_reason = ''
+
+    def _settle_depths(self) -> None:
+        while self._depths:
+            pose = self._pose_at(self._depths[0].stamp_ns)
+            if pose is Miss.NOT_YET:
+                return
+            depth = self._depths.popleft()
+            fate = 'depth used'
+            if isinstance(pose, Miss):
+                fate = f'depth: {pose.value}'
+            else:
+                try:
+                    self._map.add_depth(depth, self._camera, pose)
+                except RefusedLookError as refusal:
+                    fate = f'depth {refusal.fate}'
+            self.counts[fate] += 1
 
     def _drop(self, reason: str) -> None:
         self._forget_wait(self._pending.popleft())

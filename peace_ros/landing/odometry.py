@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, replace
-from math import hypot, isfinite
+from math import hypot
 
 import numpy as np
 
@@ -211,8 +211,3 @@ class PositionCarrier:
         if cells > 0:
             self._map.widen_unsafe(cells * cell_m)
             self._widened_m += cells * cell_m
-
-
-def has_position(pose: Pose) -> bool:
-    """Tell whether a pose knows where it is; north and east are NaN otherwise."""
-    return isfinite(pose.north_m) and isfinite(pose.east_m)

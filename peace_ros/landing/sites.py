@@ -58,8 +58,10 @@ def safe_ground(
 
     The threshold holds for the mean over 3 x 3 cells, so that the flicker of one cell does not
     make a hole; a cell that is itself more likely unsafe than safe is never safe. No threshold
-    below the fixed floor is honoured.
+    below the fixed floor is honoured. Of no cells (all lie outside of the map) none is safe.
     """
+    if layers.score.size == 0:
+        return np.zeros(layers.score.shape, np.bool_)
     threshold = max(threshold, SAFETY_THRESHOLD_FLOOR)
     known = (layers.looks >= min_looks) & (layers.age_s <= age_limit_s)
     smooth = cv2.blur(layers.score, (3, 3), borderType=cv2.BORDER_REPLICATE)

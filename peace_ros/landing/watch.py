@@ -59,7 +59,8 @@ def bad_telemetry(telemetry: Telemetry | None, age_s: float, parameters: Landing
     """Return what is wrong with telemetry in a sentence, empty when it can be trusted."""
     p = parameters
     if telemetry is None or telemetry.pose is None:
-        return 'the autopilot has not said where it is: check its streams'
+        silent = 'the autopilot has not said where it is: check its streams'
+        return silent if telemetry is None else telemetry.position_problem or silent
     if not age_s <= p.telemetry_age_limit_s:
         return f'telemetry is {age_s:.1f} s old, limit {p.telemetry_age_limit_s:.1f} s'
     pose = telemetry.pose

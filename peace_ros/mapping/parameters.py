@@ -116,6 +116,26 @@ class MapParameters:
         low=0.0,
         high=120.0,
     )
+    # Flatness, where depth is given
+    depth_smoothness_m: float = parameter(
+        0.5,
+        'Ground whose heights spread by more than this standard deviation is closed until it is '
+        'measured flat; only where depth is given (DOVESEI: 0.5).',
+        unit='m',
+        low=0.01,
+        high=10.0,
+    )
+    depth_range_m: float = parameter(
+        20.0,
+        'Depths from here on are those of a sensor that sees no farther, and are ignored '
+        '(DOVESEI: 20).',
+        unit='m',
+        low=0.5,
+        high=200.0,
+    )
+    flat_width_m: float = parameter(
+        3.0, 'Width of the ground over which heights are compared.', unit='m', low=0.5, high=20.0
+    )
     # Without position
     position_gap_limit_s: float = parameter(
         3.0,

@@ -18,8 +18,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Camera, Heatmap, ImageError, Pose
+from peace_ros.domain import Camera, DepthImage, Heatmap, ImageError, Pose
 from peace_ros.domain.errors import VehicleError
+from peace_ros.mapping.flatness import Roughness, rough_and_flat
 from peace_ros.mapping.layers import MapLayers
 from peace_ros.mapping.parameters import MapParameters
 from peace_ros.mapping.projection import (
@@ -79,6 +80,7 @@ class SafetyMap:
         self.parameters = parameters or MapParameters()
         self._cells = max(1, round(self.parameters.map_size_m / self.parameters.map_cell_m))
         self._veto = Veto(self.parameters, self._cells)
+        self._roughness = Roughness(self._cells)
         self.revision = -1
         """Grows with every change."""
         self.clear()
@@ -86,6 +88,7 @@ class SafetyMap:
     def clear(self) -> None:
         """Forget everything."""
         self._veto.clear()
+        self._roughness.clear()
         shape = (self._cells, self._cells)
         self._log_odds = np.zeros(shape, np.float32)
         self._seen_s = np.full(shape, _NEVER_S, np.float32)
@@ -128,6 +131,18 @@ class SafetyMap:
         self.revision += 1
         return self._lay(heatmap, camera, pose, elapsed_s)
 
+    def add_depth(self, depth: DepthImage, camera: Camera, pose: Pose) -> None:
+        """Close ground that is measured rough, until it is measured flat; opens nothing else.
+
+        :param camera: that of the full frame; the depth image covers it.
+        :param pose: where the camera was at the stamp of the depth image.
+        :raises RefusedLookError: (a VehicleError) on a pose that is not finite, not above ground or
+            leans too far.
+        """
+        self._check_pose(pose)
+        self._follow(pose)
+        self._roughness.take(*rough_and_flat(depth, camera, pose, self._grid, self.parameters))
+
     def _check(self, heatmap: Heatmap, pose: Pose) -> None:
         low, high = float(heatmap.safety.min()), float(heatmap.safety.max())
         if not (low >= 0.0 and high <= 1.0):  # also refuses NaN
@@ -137,12 +152,15 @@ class SafetyMap:
                 f'heatmap stamp {heatmap.stamp_ns} ns: must be newer than the last one, '
                 f'{self._stamp_ns} ns'
             )
+        self._check_pose(pose)
+
+    def _check_pose(self, pose: Pose) -> None:
         numbers = (pose.north_m, pose.east_m, pose.altitude_agl_m, *pose.quaternion_ned_frd)
         if not np.all(np.isfinite(numbers)) or pose.altitude_agl_m < LOWEST_LOOK_M:
             raise RefusedLookError(
                 'taken too low above ground',
                 f'pose {numbers}: must be finite and {LOWEST_LOOK_M} m or more above ground to '
-                'project a heatmap',
+                'project a picture',
             )
         tilt_deg, limit_deg = degrees(tilt_rad(pose)), self.parameters.tilt_limit_deg
         if tilt_deg > limit_deg:
@@ -162,6 +180,7 @@ class SafetyMap:
         if abs(d_row) <= slack and abs(d_column) <= slack:
             return
         self._first_row, self._first_column = row, column
+        self._roughness.shift(d_row, d_column)
         if self._epoch_ns is None:
             return
         self._log_odds = shifted(self._log_odds, d_row, d_column, 0.0)
@@ -184,6 +203,7 @@ class SafetyMap:
         self._seen_s = cast('NDArray[np.float32]', cv2.erode(self._seen_s, kernel))
         self._looks = cast('NDArray[np.uint16]', cv2.erode(self._looks, kernel))
         self._veto.widen(kernel)
+        self._roughness.widen(kernel)
         self.revision += 1
 
     def _decay(self, elapsed_s: float) -> tuple[float, float]:
@@ -299,6 +319,7 @@ class SafetyMap:
         known = looks > 0
         score = np.where(known, 1.0 / (1.0 + np.exp(-aged)), 0.0).astype(np.float32)
         score[self._veto.closed(rows, columns, self._seconds(now_ns))] = 0.0
+        score[self._roughness.closed(rows, columns)] = 0.0
         age = self._seconds(now_ns) - self._seen_s[rows, columns]
         age = np.where(known, age, np.inf).astype(np.float32)
         south_m = grid.south_m + rows.start * grid.cell_m

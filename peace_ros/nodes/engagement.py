@@ -131,7 +131,8 @@ def reason_against(
 
 def _against_vehicle(told: Telemetry | None, age_s: float, parameters: LandingParameters) -> str:
     if told is None or told.pose is None:
-        return 'no telemetry: the autopilot has not said where it is; check its streams'
+        silent = 'no telemetry: the autopilot has not said where it is; check its streams'
+        return silent if told is None else told.position_problem or silent
     limit_s = parameters.telemetry_age_limit_s
     if not age_s <= limit_s:
         return f'telemetry is {age_s:.1f} s old, limit {limit_s} s: check the line'

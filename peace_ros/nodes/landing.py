@@ -7,23 +7,19 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Sequence
 from math import inf
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
-from sensor_msgs.msg import Image
 
-from peace_ros.domain import PeaceError, Setpoint, Telemetry, VehicleError
+from peace_ros.domain import Setpoint, Telemetry, VehicleError
 from peace_ros.landing import Decision, LandingCore, LandingParameters, State
 from peace_ros.mapping import MapParameters
 from peace_ros.nodes.engagement import SILENT_STATES, EngagementServices, reason_against
-from peace_ros.nodes.inputs import ImageMessage, subscribe_images
-from peace_ros.nodes.messages import frame_from_message, heatmap_from_image
+from peace_ros.nodes.inputs import LandingInputs
 from peace_ros.nodes.options import CameraOptions, LandingOptions
 from peace_ros.nodes.parameters import Group
-from peace_ros.nodes.qos import IMAGE_IN
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.status import DecisionPublisher, Situation
 from peace_ros.nodes.vehicle_access import VehicleAccess
@@ -57,32 +53,25 @@ class LandingNode(PeaceNode):
         )
         self._lock = threading.RLock()
         """Guards the core: the engage service runs beside the timer."""
-        self._heatmaps: deque[Image] = deque(maxlen=4)
-        self._images: deque[ImageMessage] = deque(maxlen=4)
         self._sender: SetpointSender | None = None
         self._closed = False
         self._state = State.IDLE
         self._publisher = DecisionPublisher(self)
         self._access = VehicleAccess(self, self._options, self.filled(VehicleParameters))
-        self.create_subscription(Image, 'heatmap', self._on_heatmap, IMAGE_IN)
-        if self._options.registration:
-            subscribe_images(self, self._options.image_transport, self._on_image)
+        self._inputs = LandingInputs(self, self._options)
         self._engagement = EngagementServices(self, auto=self._options.auto_engage)
         # A ROS-time timer would stand still with a clock that stops or jumps.
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0 / self._options.rate, self._step, clock=self._steady)
         self.get_logger().info(f'waiting for the vehicle: {self._access.name}')
 
-    def _on_heatmap(self, message: Image) -> None:
-        self._heatmaps.append(message)
-
-    def _on_image(self, message: ImageMessage) -> None:
-        self._images.append(message)
-
     def _step(self) -> None:
         at_ns = self.clock_ns()
         with self._lock:
-            self._take_heatmaps()
+            link = self._access.link
+            for pose in () if link is None else link.take_poses():
+                self._core.add_pose(pose)
+            self._inputs.feed(self._core)
             told, age_s = self._telemetry()
             decision = self._core.step(at_ns, told, age_s)
             self._submit(decision)
@@ -91,27 +80,6 @@ class LandingNode(PeaceNode):
         self._publisher.publish(decision, situation, at_ns)
         self._access.follow(decision)
         self._engagement.engage_when_ready()
-
-    def _take_heatmaps(self) -> None:
-        link = self._access.link
-        for pose in () if link is None else link.take_poses():
-            self._core.add_pose(pose)
-        while self._images:
-            self._take_image(self._images.popleft())
-        while self._heatmaps:
-            self._take_heatmap(self._heatmaps.popleft())
-
-    def _take_heatmap(self, message: Image) -> None:
-        try:
-            self._core.add_heatmap(heatmap_from_image(message))
-        except PeaceError as error:
-            self.say('heatmap', f'heatmap refused: {error}')
-
-    def _take_image(self, message: ImageMessage) -> None:
-        try:
-            self._core.add_view(frame_from_message(message))
-        except PeaceError as error:
-            self.say('image', f'image refused: {error}')
 
     def _telemetry(self) -> tuple[Telemetry | None, float]:
         link = self._access.link

@@ -22,6 +22,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from peace_ros.domain import (
     Camera,
+    DepthImage,
     Frame,
     Heatmap,
     ImageError,
@@ -40,6 +41,7 @@ from peace_ros.poses import pose_from_enu_flu
 from peace_ros.prompting.pairs import prompt_from_pairs, prompt_pairs
 
 NANOSECONDS = 1_000_000_000
+_FLOAT_BYTES = 4
 LOCAL_FRAME = 'map'
 """ENU, origin of the autopilot's local frame."""
 BODY_FRAME = 'base_link'
@@ -113,6 +115,22 @@ def heatmap_from_image(message: Image) -> Heatmap:
         message.encoding, message.width, message.height, message.step, message.data
     )
     return Heatmap(levels[:, :, 0].astype(np.float32) / np.float32(255.0), stamp_ns(message))
+
+
+def depth_from_image(message: Image) -> DepthImage:
+    """Return the depth image of a 32FC1 Image (metres); any other encoding is an ImageError."""
+    if message.encoding != '32FC1':
+        raise ImageError(f'depth encoding {message.encoding!r}: publish it as 32FC1, in metres')
+    row_bytes, size = message.width * _FLOAT_BYTES, message.height * message.step
+    if message.width < 1 or message.step < row_bytes or len(message.data) != size:
+        raise ImageError(
+            f'depth image {message.width} x {message.height}, {message.step} bytes per row: '
+            f'{len(message.data)} bytes came, {size} fit'
+        )
+    rows = np.frombuffer(bytes(message.data), np.uint8).reshape(message.height, message.step)
+    order = '>f4' if message.is_bigendian else '<f4'
+    depth = np.ascontiguousarray(rows[:, :row_bytes]).view(order).astype(np.float32)
+    return DepthImage(depth, stamp_ns(message))
 
 
 def diagnostic_array(

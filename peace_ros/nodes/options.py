@@ -155,6 +155,11 @@ class SatelliteViewOptions:
     pose_mavlink: str = parameter(
         '', 'Connection that reports the pose, written as for landing; implies pose_source mavlink'
     )
+    pose_signing_key_file: str = parameter(
+        '',
+        'File with the key of MAVLink 2 signing on that connection, as '
+        'vehicle.signing_key_file of landing; empty: no signing',
+    )
     start_altitude: float = parameter(
         100.0, 'With pose_source twist: altitude at the start', unit='m', low=1.0, high=1000.0
     )

@@ -7,6 +7,7 @@ from __future__ import annotations
 import importlib
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, Twist
@@ -54,10 +55,12 @@ class TopicSource:
 class MavlinkSource:
     """Position and attitude that an autopilot reports, on a connection of our own."""
 
-    def __init__(self, node: PeaceNode, sink: Sink, url: str) -> None:
+    def __init__(self, node: PeaceNode, sink: Sink, url: str, signing_key_file: str = '') -> None:
         self._sink = sink
         self._output = _PoseOutput(node)
-        parameters = VehicleParameters(system_id=_CAMERA_SYSTEM_ID)
+        parameters = VehicleParameters(
+            system_id=_CAMERA_SYSTEM_ID, signing_key_file=signing_key_file
+        )
 
         def open_link() -> MavlinkLink:
             return open_vehicle(url, 'auto', node.clock_ns, parameters, _TRY_S)
@@ -69,7 +72,10 @@ class MavlinkSource:
     def _poll(self) -> None:
         link = self._connection.link
         for pose in () if link is None else link.take_poses():
-            self._output.publish(pose)
+            if not pose.has_position:
+                continue  # over which ground the vehicle is, nobody knows then
+            # On the topic the ground is at z = 0, wherever the autopilot has its origin.
+            self._output.publish(replace(pose, down_m=-pose.altitude_agl_m))
             self._sink(pose)
 
     def close(self) -> None:

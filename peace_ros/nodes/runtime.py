@@ -169,11 +169,25 @@ class _PatientExecutor(MultiThreadedExecutor):  # type: ignore[misc]
         return bool(super().shutdown(timeout_sec))
 
 
+class _Enough(Future):  # type: ignore[misc]
+    """Ends the spinning; keeps one callback, as rclpy adds another with every turn of its loop."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._is_watched = False
+
+    def add_done_callback(self, callback: Callable[[Future], None]) -> None:
+        """Keep the first: all of them wake the same executor."""
+        if not self._is_watched:
+            self._is_watched = True
+            super().add_done_callback(callback)
+
+
 def _spin_until_ended(node: PeaceNode, threads: int) -> None:
     """Spin in a thread, because Python runs signal handlers only while its main thread is free."""
     executor = SingleThreadedExecutor() if threads == 1 else _PatientExecutor(threads)
     executor.add_node(node)
-    enough = Future()
+    enough = _Enough()
 
     def spin() -> None:
         try:

@@ -68,7 +68,9 @@ class SatelliteViewNode(PeaceNode):
 
     def _create_source(self, options: SatelliteViewOptions) -> PoseSource:
         if options.pose_mavlink:
-            return MavlinkSource(self, self._on_pose, options.pose_mavlink)
+            return MavlinkSource(
+                self, self._on_pose, options.pose_mavlink, options.pose_signing_key_file
+            )
         if options.pose_source == 'twist':
             return TwistSource(self, self._on_pose, options.start_altitude, options.twist_timeout)
         return TopicSource(self, self._on_pose)

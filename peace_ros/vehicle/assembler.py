@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import isfinite, nan, sqrt
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -15,19 +15,17 @@ from peace_ros.domain.geometry import Quaternion, quaternion_from_euler, yaw_fro
 from peace_ros.domain.motion import Pose, Telemetry
 from peace_ros.vehicle.clock import TimeMap
 from peace_ros.vehicle.dialects import Dialect
+from peace_ros.vehicle.heights import MAX_EXTRAPOLATION_S, Height, HomeHeight, height_of
 from peace_ros.vehicle.parameters import VehicleParameters
 from peace_ros.vehicle.texts import StatusTexts
 from peace_ros.vehicle.trust import JumpWatch, Report
 
-MAX_EXTRAPOLATION_S = 0.3
 RANGE_LIMIT_S = 0.5
 REBOOT_MS = 1000
 """A boot time that goes back by more than this is a reboot."""
 MAX_POSES = 256
 ESTIMATOR_LIMIT_S = 3.0
 """Age at which what the position filter said of itself is no longer known."""
-HOME_STEP_M = 1.0
-"""A home whose height changes by more than this in flight says nothing about the ground below."""
 KNOWS_POSITION = mavlink.ESTIMATOR_POS_HORIZ_REL | mavlink.ESTIMATOR_POS_HORIZ_ABS
 GUESSES_POSITION = mavlink.ESTIMATOR_CONST_POS_MODE
 IN_ORDER = frozenset({'LOCAL_POSITION_NED', 'ATTITUDE', 'ATTITUDE_QUATERNION'})
@@ -74,8 +72,6 @@ class Assembler:
         """Message id -> steady clock of the newest."""
         self.landed_state = 0
         """MAV_LANDED_STATE; 0 while it is not known."""
-        self.home_msl_m: float | None = None
-        """Altitude of home above sea level."""
         self._received_ns = 0
         self._battery: float | None = None
         self._mode = ''
@@ -89,7 +85,8 @@ class Assembler:
         self._pose: Pose | None = None
         self._pose_ns = 0
         self._yaw_rad = 0.0
-        self._home_down_m: float | None = None
+        self._home = HomeHeight(is_local=self._dialect.home_is_local)
+        self._height: Height | None = None
         self._range: tuple[int, float] | None = None
         self._boot_ms = 0
         self._newest_boot_ms: dict[str, int] = {}
@@ -138,6 +135,16 @@ class Assembler:
         """Newest heading, NED; it needs no position."""
         return self._yaw_rad
 
+    @property
+    def home_msl_m(self) -> float | None:
+        """Altitude of home above sea level."""
+        return self._home.home_msl_m
+
+    @property
+    def reported_ns(self) -> int:
+        """The autopilot's clock of the newest believed position, 0 before the first."""
+        return 0 if self._position is None else self._position.report.boot_ms * 1_000_000
+
     def heartbeat_age_s(self, steady_ns: int) -> float:
         """Return the time since the newest HEARTBEAT, infinite before the first."""
         if self._heartbeat_ns is None:
@@ -157,13 +164,8 @@ class Assembler:
     def telemetry(self, steady_ns: int) -> Telemetry:
         """Return what is known now; a pose that is too old or not to be believed is None."""
         p = self._parameters
-        pose = self._pose
-        if (
-            pose is None
-            or steady_ns - self._pose_ns > p.pose_limit_s * 1e9
-            or self.position_problem(steady_ns)
-            or self._is_silent(steady_ns)
-        ):
+        pose, problem = self._pose, self._doubt(steady_ns)
+        if pose is None or problem or steady_ns - self._pose_ns > p.pose_limit_s * 1e9:
             pose = None
         at = self._position
         velocity = at.report.velocity_m_s if at and pose else (0.0, 0.0, 0.0)
@@ -171,6 +173,7 @@ class Assembler:
         return Telemetry(
             received_ns=self._received_ns,
             pose=pose,
+            position_problem=problem,
             v_north_m_s=velocity[0],
             v_east_m_s=velocity[1],
             v_down_m_s=velocity[2],
@@ -182,10 +185,13 @@ class Assembler:
             battery_remaining=self._battery,
         )
 
-    def _is_silent(self, steady_ns: int) -> bool:
-        if self._heartbeat_ns is None:
-            return False
-        return self.heartbeat_age_s(steady_ns) > self._parameters.heartbeat_limit_s
+    def _doubt(self, steady_ns: int) -> str:
+        """Return why nothing that was said of the position is believed, empty when it is."""
+        problem = self.position_problem(steady_ns)
+        limit_s, age_s = self._parameters.heartbeat_limit_s, self.heartbeat_age_s(steady_ns)
+        if problem or self._heartbeat_ns is None or age_s <= limit_s:
+            return problem
+        return f'HEARTBEAT is {age_s:.1f} s old, limit {limit_s:g} s: nobody knows who flies'
 
     def _estimator_flags(self, steady_ns: int) -> int | None:
         if self._estimator is None:
@@ -228,9 +234,9 @@ class Assembler:
         """Bring the newest position to the moment of the attitude, by its velocity."""
         self._yaw_rad = yaw_from_quaternion(q)
         at = self._position
-        if at is None or steady_ns - at.steady_ns > self._parameters.pose_limit_s * 1e9:
-            return
-        if self.position_problem(steady_ns):
+        limit_ns = self._parameters.pose_limit_s * 1e9
+        if at is None or steady_ns - at.steady_ns > limit_ns or self.position_problem(steady_ns):
+            self._make_bare_pose(q, boot_ms, stamp_ns, steady_ns)
             return
         dt = (boot_ms - at.report.boot_ms) / 1000.0
         dt = max(-MAX_EXTRAPOLATION_S, min(MAX_EXTRAPOLATION_S, dt))
@@ -249,8 +255,28 @@ class Assembler:
         self._pose_ns = min(steady_ns, at.steady_ns)
         self.poses.append(self._pose)
 
+    def _make_bare_pose(self, q: Quaternion, boot_ms: int, stamp_ns: int, steady_ns: int) -> None:
+        """Tell attitude and altitude alone, by which pictures can stand in for the position."""
+        height = self._height
+        limit_ns = self._parameters.pose_limit_s * 1e9
+        if height is None or steady_ns - height.steady_ns > limit_ns or self._watch.problem:
+            return
+        above_home_m = height.at_m(boot_ms)
+        self.poses.append(
+            Pose(
+                stamp_ns=self._clock.stamp_ns(boot_ms, stamp_ns),
+                north_m=nan,
+                east_m=nan,
+                down_m=(self._home.down_m or 0.0) - above_home_m,
+                quaternion_ned_frd=q,
+                altitude_agl_m=self._above_ground_m(above_home_m, q, steady_ns),
+            )
+        )
+
     def _altitude_m(self, down_m: float, q: Quaternion, steady_ns: int) -> float:
-        above_home = (self._home_down_m or 0.0) - down_m
+        return self._above_ground_m((self._home.down_m or 0.0) - down_m, q, steady_ns)
+
+    def _above_ground_m(self, above_home: float, q: Quaternion, steady_ns: int) -> float:
         if self._parameters.altitude_source != 'rangefinder' or self._range is None:
             return above_home
         seen_ns, distance_m = self._range
@@ -264,14 +290,20 @@ class Assembler:
         in_range = m.min_distance < m.current_distance < m.max_distance
         self._range = (steady_ns, m.current_distance / 100.0) if in_range else None
 
-    def _home(self, m: Any, _stamp_ns: int, _steady_ns: int) -> None:
-        flying = self._armed and self.landed_state != mavlink.MAV_LANDED_STATE_ON_GROUND
-        known_m = self._home_down_m
-        if flying and known_m is not None and abs(m.z - known_m) > HOME_STEP_M:
-            self.rejected += 1
-            return
-        self._home_down_m = m.z
-        self.home_msl_m = m.altitude / 1000.0
+    def _take_home(self, m: Any, _stamp_ns: int, _steady_ns: int) -> None:
+        believed = self._home.take_home(m.altitude / 1e3, m.z, flying=self._is_flying)
+        self.rejected += not believed
+
+    def _take_origin(self, m: Any, _stamp_ns: int, _steady_ns: int) -> None:
+        believed = self._home.take_origin(m.altitude / 1e3, flying=self._is_flying)
+        self.rejected += not believed
+
+    def _take_height(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
+        self._height = height_of(m, steady_ns)
+
+    @property
+    def _is_flying(self) -> bool:
+        return self._armed and self.landed_state != mavlink.MAV_LANDED_STATE_ON_GROUND
 
     def _landed(self, m: Any, _stamp_ns: int, _steady_ns: int) -> None:
         self.landed_state = m.landed_state
@@ -303,7 +335,10 @@ _HANDLERS = {
     'ATTITUDE': Assembler._euler,  # noqa: SLF001
     'ATTITUDE_QUATERNION': Assembler._quaternion,  # noqa: SLF001
     'DISTANCE_SENSOR': Assembler._distance,  # noqa: SLF001
-    'HOME_POSITION': Assembler._home,  # noqa: SLF001
+    'HOME_POSITION': Assembler._take_home,  # noqa: SLF001
+    'GPS_GLOBAL_ORIGIN': Assembler._take_origin,  # noqa: SLF001
+    'GLOBAL_POSITION_INT': Assembler._take_height,  # noqa: SLF001
+    'ALTITUDE': Assembler._take_height,  # noqa: SLF001
     'EXTENDED_SYS_STATE': Assembler._landed,  # noqa: SLF001
     'SYS_STATUS': Assembler._health,  # noqa: SLF001
     'EKF_STATUS_REPORT': Assembler._estimate,  # noqa: SLF001

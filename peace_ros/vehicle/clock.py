@@ -14,6 +14,8 @@ from statistics import median
 WINDOW = 40
 FEWEST = 3
 """Round trips before an offset is believed."""
+KNOWN = 3 * FEWEST
+"""Round trips after which the clocks are asked for less often."""
 QUICK_NS = 2_000_000
 """Slack above the quickest round trip."""
 SLOWEST_NS = 500_000_000
@@ -47,6 +49,11 @@ class TimeMap:
     def samples(self) -> int:
         """Round trips in the window."""
         return len(self._samples)
+
+    @property
+    def wants_more(self) -> bool:
+        """Round trips are needed soon: too few were made, or the last one did not fit."""
+        return len(self._samples) < KNOWN or self._deviating > 0
 
     @property
     def round_trip_ns(self) -> int | None:
@@ -90,11 +97,11 @@ class TimeMap:
     def stamp_ns(self, boot_ms: int, received_ns: int) -> int:
         """Return the node clock of a moment of the autopilot's; stamps never go back.
 
-        Where the offset is unknown, or gives a moment in the future or long ago, it is the moment
-        of receipt.
+        Where the offset is unknown or in doubt, or gives a moment in the future or long ago, it is
+        the moment of receipt: a simulation that stood still for a moment has lost that time.
         """
         stamp_ns = received_ns
-        if self._offset_ns is not None:
+        if self._offset_ns is not None and not self._deviating:
             mapped_ns = boot_ms * 1_000_000 + self._offset_ns
             if received_ns - OLDEST_NS <= mapped_ns <= received_ns + AHEAD_NS:
                 stamp_ns = min(mapped_ns, received_ns)

@@ -70,6 +70,16 @@ class Dialect(Protocol):
         ...
 
     @property
+    def height_message(self) -> int:
+        """Message id of a height above home that needs no position."""
+        ...
+
+    @property
+    def home_is_local(self) -> bool:
+        """HOME_POSITION tells where home is in the local frame, not only on the globe."""
+        ...
+
+    @property
     def heartbeat_rate_hz(self) -> float:
         """Rate of HEARTBEAT to ask for; 0: a new mode is told at once anyway."""
         ...
@@ -209,6 +219,8 @@ class ArduPilot:
     land_mode: str = 'LAND'
     level_mode: str = 'GUIDED_NOGPS'
     estimator_message: int = 193
+    height_message: int = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+    home_is_local: bool = False
     heartbeat_rate_hz: float = 0.0
     _names: dict[int, str] = field(
         default_factory=lambda: {number: name for name, number in ARDUCOPTER_MODES.items()}
@@ -263,6 +275,8 @@ class Px4:
     land_mode: str = 'AUTO.LAND'
     level_mode: str = ''
     estimator_message: int = 230
+    height_message: int = mavlink.MAVLINK_MSG_ID_ALTITUDE
+    home_is_local: bool = True
     heartbeat_rate_hz: float = 5.0
     _names: dict[tuple[int, int], str] = field(
         default_factory=lambda: {numbers: name for name, numbers in PX4_MODES.items()}
@@ -291,21 +305,47 @@ class Px4:
 
 
 DIALECTS = ('auto', 'ardupilot', 'px4')
+NO_MULTICOPTERS = {
+    mavlink.MAV_TYPE_FIXED_WING: 'a fixed-wing aircraft',
+    mavlink.MAV_TYPE_ANTENNA_TRACKER: 'an antenna tracker',
+    mavlink.MAV_TYPE_AIRSHIP: 'an airship',
+    mavlink.MAV_TYPE_GROUND_ROVER: 'a ground vehicle',
+    mavlink.MAV_TYPE_SURFACE_BOAT: 'a boat',
+    mavlink.MAV_TYPE_SUBMARINE: 'a submarine',
+}
+"""MAV_TYPEs that cannot hover; their firmwares also number their modes in another way."""
+VTOL_TYPES = range(19, 26)
+"""MAV_TYPE_VTOL_...; their names differ between versions of pymavlink."""
 
 
-def choose_dialect(wanted: str, autopilot: int, hold_mode: str = 'BRAKE') -> Dialect:
+def choose_dialect(
+    wanted: str,
+    autopilot: int,
+    hold_mode: str = 'BRAKE',
+    vehicle_type: int = mavlink.MAV_TYPE_QUADROTOR,
+) -> Dialect:
     """Return the dialect of the autopilot that was heard.
 
     Args:
         wanted: ``auto``, ``ardupilot`` or ``px4``.
         autopilot: MAV_AUTOPILOT of its HEARTBEAT.
         hold_mode: ArduPilot's mode for holding position.
+        vehicle_type: MAV_TYPE of its HEARTBEAT.
 
     Raises:
-        VehicleError: Unknown name, or the autopilot heard is another one than was asked for.
+        VehicleError: Unknown name, the autopilot heard is another one than was asked for, or its
+            vehicle is no multicopter.
     """
     if wanted not in DIALECTS:
         raise VehicleError(f'dialect {wanted!r}: choose one of {", ".join(DIALECTS)}')
+    kind = NO_MULTICOPTERS.get(vehicle_type, '')
+    if autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA and vehicle_type in VTOL_TYPES:
+        kind = 'a VTOL, which ArduPlane flies'
+    if kind:
+        raise VehicleError(
+            f'the vehicle heard is {kind} (MAV_TYPE {vehicle_type}): connect to a multicopter or '
+            'a helicopter'
+        )
     known: tuple[Dialect, ...] = (ArduPilot(hold_mode=hold_mode), Px4())
     for dialect in known:
         if dialect.autopilot == autopilot:

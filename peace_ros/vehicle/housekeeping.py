@@ -11,12 +11,12 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.vehicle.assembler import Assembler
-from peace_ros.vehicle.clock import FEWEST, TimeMap
+from peace_ros.vehicle.clock import TimeMap
 from peace_ros.vehicle.streams import StreamKeeper
 
 HEARTBEAT_NS = 1_000_000_000
-TIMESYNC_FIRST_NS = 100_000_000
-TIMESYNC_NS = 1_000_000_000
+TIMESYNC_SOON_NS = 100_000_000
+TIMESYNC_NS = 500_000_000
 OPEN_QUESTIONS = 8
 """TIMESYNC questions whose answers are still taken."""
 
@@ -72,8 +72,8 @@ class Housekeeping:
             messages.append(self._answer)
             self._answer = None
         if now_ns >= self._timesync_due_ns:
-            known = self._clock.samples >= 3 * FEWEST
-            self._timesync_due_ns = now_ns + (TIMESYNC_NS if known else TIMESYNC_FIRST_NS)
+            soon = self._clock.wants_more
+            self._timesync_due_ns = now_ns + (TIMESYNC_SOON_NS if soon else TIMESYNC_NS)
             asked_ns = max(1, self._clock_ns())
             self._asked_ns.append(asked_ns)
             messages.append(mavlink.MAVLink_timesync_message(0, asked_ns))

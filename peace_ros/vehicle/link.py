@@ -31,7 +31,10 @@ class VehicleLink(Protocol):
         ...
 
     def take_poses(self) -> list[Pose]:
-        """Return the poses since the last call, oldest first, stamped with the node clock."""
+        """Return the poses since the last call, oldest first, stamped with the node clock.
+
+        Where only attitude and altitude are known, north and east are NaN.
+        """
         ...
 
     def send_velocity(self, setpoint: Setpoint) -> None:

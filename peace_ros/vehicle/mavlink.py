@@ -21,12 +21,12 @@ from peace_ros.vehicle.control import Control
 from peace_ros.vehicle.dialects import Dialect, choose_dialect, level_message
 from peace_ros.vehicle.housekeeping import Housekeeping
 from peace_ros.vehicle.lasting import LastingTransport
+from peace_ros.vehicle.obedience import ObedienceWatch
 from peace_ros.vehicle.parameters import VehicleParameters
 from peace_ros.vehicle.peer import Peer
 from peace_ros.vehicle.requests import Requests
 from peace_ros.vehicle.result import Answer, RequestResult
 from peace_ros.vehicle.signing import Signer
-from peace_ros.vehicle.sinking import SinkWatch
 from peace_ros.vehicle.streams import StreamKeeper
 from peace_ros.vehicle.transport import Source
 from peace_ros.vehicle.wire import Wire
@@ -64,7 +64,7 @@ class MavlinkLink:
         self._parameters = parameters
         self._clock_ns = clock_ns
         key_file = parameters.signing_key_file
-        signer = Signer.from_file(key_file) if key_file else None
+        signer = Signer.from_file(key_file, parameters.system_id) if key_file else None
         self._wire = Wire(parameters.system_id, signer, datagrams=transport.datagrams)
         self._changed = threading.Condition()
         self._stop = threading.Event()
@@ -84,7 +84,7 @@ class MavlinkLink:
         self._holding_level = False
         self._bytes_heard = 0
         self._thread = threading.Thread(target=self._run, name='mavlink_link', daemon=True)
-        self._sinking = SinkWatch()
+        self._obedience = ObedienceWatch()
         self._thread.start()
         self._await_autopilot()
 
@@ -117,7 +117,7 @@ class MavlinkLink:
         """Why the autopilot will not obey velocities now, empty when nothing speaks against it."""
         with self._changed:
             found = self._heard().position_problem(time.monotonic_ns())
-            return found or self._sinking.problem
+            return found or self._obedience.problem
 
     @property
     def ignored(self) -> int:
@@ -164,14 +164,19 @@ class MavlinkLink:
             heard = self._heard()
             told = heard.telemetry(time.monotonic_ns())
             if not told.in_control:
-                self._sinking.forget()
-            altitude_m = None if told.pose is None else told.pose.altitude_agl_m
+                self._obedience.forget()
+            at = told.pose
+            position_m = None if at is None else (at.north_m, at.east_m, -at.altitude_agl_m)
             reported_ns = heard.arrived_ns.get(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 0)
-            self._sinking.take(altitude_m, reported_ns)
-            return replace(told, pose=None) if self._sinking.problem else told
+            self._obedience.take(position_m, reported_ns, heard.reported_ns)
+            problem = self._obedience.problem
+            return replace(told, pose=None, position_problem=problem) if problem else told
 
     def take_poses(self) -> list[Pose]:
-        """Return the poses since the last call, oldest first (at most 256)."""
+        """Return the poses since the last call, oldest first (at most 256).
+
+        While there is no position, north and east are NaN.
+        """
         with self._changed:
             poses = list(self._heard().poses)
             self._heard().poses.clear()
@@ -198,7 +203,7 @@ class MavlinkLink:
                 f'velocity set-point {v} m/s: all components must be finite; nothing was sent'
             )
         self._zero_until_ns = 0
-        self._sinking.tell(setpoint.v_down_m_s)
+        self._obedience.tell(v)
         self._send_setpoint(setpoint)
 
     def send_landing_target(self, site_ned_m: tuple[float, float, float], pose: Pose) -> None:
@@ -316,10 +321,13 @@ class MavlinkLink:
             error = self._error
         self.close()
         refused = f', {self._wire.refused} not rightly signed' if self._wire.refused else ''
+        served = ''
+        if not self._transport.datagrams and not self._bytes_heard:
+            served = '; a TCP port of a simulation serves one client: is another connected'
         raise error or VehicleError(
             f'no HEARTBEAT of an autopilot within {limit_s} s ({self._bytes_heard} bytes heard'
             f'{refused}): check address, port, baud rate and that MAVLink 2 is sent to this line'
-            f'{self._peer.heard_instead()}'
+            f'{served}{self._peer.heard_instead()}'
         )
 
     def _run(self) -> None:
@@ -367,7 +375,10 @@ class MavlinkLink:
             return False
         try:
             self._dialect = choose_dialect(
-                self._wanted_dialect, message.autopilot, self._parameters.hold_mode
+                self._wanted_dialect,
+                message.autopilot,
+                self._parameters.hold_mode,
+                message.type,
             )
         except VehicleError as error:
             self._error = error

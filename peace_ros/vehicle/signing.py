@@ -86,10 +86,13 @@ class Signer:
         """Signed with another key, damaged, or with a time stamp that was used before."""
 
     @classmethod
-    def from_file(cls, key_file: str) -> Signer:
-        """Read the key; the time stamps are kept beside it in ``<key_file>.time``."""
+    def from_file(cls, key_file: str, system_id: int) -> Signer:
+        """Read the key; time stamps are kept beside it in ``<key_file>.<system_id>.time``.
+
+        Camera and companion share a key and not their time stamps: each has a file of its own.
+        """
         path = Path(key_file).expanduser()
-        return cls(read_key(key_file), path.with_name(f'{path.name}.time'))
+        return cls(read_key(key_file), path.with_name(f'{path.name}.{system_id}.time'))
 
     def sign(self, unsigned: bytes) -> bytes:
         """Return a message whose header and checksum already say that it is signed, signed."""

@@ -13,8 +13,9 @@ from peace_ros.vehicle.parameters import VehicleParameters
 SILENT_NS = 1_500_000_000
 """A stream that is silent for so long is asked for again."""
 ASK_AGAIN_NS = 1_000_000_000
-HOME_AGAIN_NS = 3_000_000_000
+ONCE_AGAIN_NS = 3_000_000_000
 HEALTH_HZ = 1.0
+HEIGHT_HZ = 10.0
 ESTIMATOR_HZ = 4.0
 
 Request = tuple[int, tuple[float, float]]
@@ -31,11 +32,15 @@ class StreamKeeper:
             mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: parameters.state_rate_hz,
             mavlink.MAVLINK_MSG_ID_SYS_STATUS: HEALTH_HZ,
             dialect.estimator_message: ESTIMATOR_HZ,
+            dialect.height_message: HEIGHT_HZ,
         }
         if dialect.heartbeat_rate_hz > 0.0:
             self._rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
         if parameters.altitude_source == 'rangefinder':
             self._rates_hz[mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR] = parameters.pose_rate_hz
+        self._wanted_once = [mavlink.MAVLINK_MSG_ID_HOME_POSITION]
+        if not dialect.home_is_local:
+            self._wanted_once.append(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
         self._asked_ns: dict[int, int] = {}
         self._reboots = 0
 
@@ -54,10 +59,10 @@ class StreamKeeper:
                     (float(message_id), 1e6 / rate_hz),
                 )
                 self._ask(requests, message_id, request, ASK_AGAIN_NS, now_ns)
-        home = mavlink.MAVLINK_MSG_ID_HOME_POSITION
-        if home not in assembler.arrived_ns:
-            request = (mavlink.MAV_CMD_REQUEST_MESSAGE, (float(home), 0.0))
-            self._ask(requests, home, request, HOME_AGAIN_NS, now_ns)
+        for once in self._wanted_once:
+            if once not in assembler.arrived_ns:
+                request = (mavlink.MAV_CMD_REQUEST_MESSAGE, (float(once), 0.0))
+                self._ask(requests, once, request, ONCE_AGAIN_NS, now_ns)
         return requests
 
     def forget(self) -> None:

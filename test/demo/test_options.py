@@ -42,6 +42,8 @@ def photo(tmp_path) -> Path:
         ({'pose_mavlink': 'udpin:127.0.0.1:1'}, '--mavlink'),
         ({'mavlink': 'udpin:127.0.0.1:1', 'pose_mavlink': 'udpin:127.0.0.1:1'}, 'second'),
         ({'mavlink': 'tcp:h:1', 'pose_mavlink': 'tcp:h:2', 'speed': 2.0}, '--speed'),
+        ({'autopilot': 'betaflight'}, '--autopilot'),
+        ({'mavlink': 'tcp:h:1', 'pose_mavlink': 'tcp:h:2', 'autopilot': 'px4'}, '--autopilot'),
     ],
 )
 def test_senseless_options_are_refused(given, words) -> None:

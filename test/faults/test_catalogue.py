@@ -11,6 +11,7 @@ import pytest
 
 from peace_ros.domain import ConfigurationError
 from peace_ros.faults.catalogue import FAULTS, REPRESENTATIVE, choose, groups, named
+from peace_ros.faults.fault import GOING
 from peace_ros.faults.table import markdown
 from peace_ros.landing import State
 
@@ -30,7 +31,7 @@ ASKED_FOR = {
     ),
     'telemetry stops, altitude NaN, jumps, sign error, wrong frame': (
         'telemetry_stops altitude_nan altitude_jumps_up altitude_jumps_down altitude_sign '
-        'frame_enu frame_south'
+        'frame_enu frame_south frame_south_at_origin frame_msl'
     ),
     'link lost for 1, 5, 60 s, duplicated, reordered, corrupted, second companion': (
         'line_lost_1_s line_lost_5_s line_lost_60_s line_doubles line_shuffles line_damages '
@@ -39,11 +40,12 @@ ASKED_FOR = {
     'autopilot reboots, refuses, changes mode': (
         'autopilot_reboots autopilot_refuses pilot_takes_over_landing'
     ),
-    'GNSS lost': 'gnss_lost gnss_lost_position_stale',
+    'GNSS lost': 'gnss_lost gnss_lost_for_good gnss_lost_position_stale',
     'clock steps': 'clock_steps_forward clock_steps_back',
     'process killed and restarted at each state': (
         'landing_killed_searching landing_killed_aiming landing_killed_landing '
-        'landing_killed_handover segmentation_killed camera_killed'
+        'landing_killed_waiting landing_killed_climbing landing_killed_restarting '
+        'landing_killed_handover landing_killed_hold segmentation_killed camera_killed'
     ),
     'executor stalled': 'executor_stalls landing_stands_still',
     'disk full while recording': 'disk_full',
@@ -75,6 +77,25 @@ def test_what_has_to_happen_can_happen_before_the_fault_is_over() -> None:
         limits = (e.within_s, e.still_within_s or 0.0, e.zero_within_s or 0.0)
         # A take-over is final, so its limits may lie after the end of the injection.
         assert max(limits) < fault.lasts_s + 1.5, fault.name
+
+
+def test_no_fault_asks_for_nothing() -> None:
+    for fault in FAULTS:
+        e = fault.expected
+        asked = (
+            *e.reaches,
+            e.still_within_s,
+            e.zero_within_s,
+            e.silent_within_s,
+            e.refuses or None,
+        )
+        assert any(each is not None for each in asked), fault.name
+
+
+def test_a_state_that_no_landing_comes_to_by_itself_is_led_to() -> None:
+    for fault in FAULTS:
+        undisturbed = {State.IDLE.value, *GOING}
+        assert (fault.lead is not None) == (fault.at.state not in undisturbed), fault.name
 
 
 def test_names_and_groups_choose() -> None:

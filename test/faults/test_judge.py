@@ -189,3 +189,14 @@ def test_the_description_says_every_limit(stopping: Fault) -> None:
         'HOLD within 2.5 s; no descent after 3 s; zero on the wire within 2.8 s; '
         'afterwards LANDING within 4 s'
     )
+
+
+def test_a_person_below_is_not_descended_upon_for_long(stopping: Fault, record: Record) -> None:
+    fault = with_expected(stopping, over_person_s=1.5)
+    assert any('nobody walked below' in each for each in judge(fault, record).failures)
+    record.over_person_s = 1.2
+    row = judge(fault, record)
+    assert row.passed
+    assert row.figures['over_person_s'] == 1.2
+    record.over_person_s = 1.8
+    assert any('over the person for 1.8 s' in each for each in judge(fault, record).failures)

@@ -37,8 +37,9 @@ def test_the_meadow_is_open_and_the_crowd_leaves_no_site(folder: Path) -> None:
 
 @pytest.mark.parametrize(('name', 'safe'), [('meadow', True), ('roofs', False)])
 def test_the_start_lies_over_what_the_name_says(folder: Path, name: str, safe: bool) -> None:
-    world = worlds.load(folder, name).world
-    column, row = (round(each) for each in world.pixel(0.0, 0.0))
+    ground = worlds.load(folder, name)
+    world = ground.world
+    column, row = (round(each) for each in world.pixel(*ground.begin_m))
     assert world.labels is not None
     around = world.labels[row - 30 : row + 31, column - 30 : column + 31]
     assert bool(is_safe(around).mean() > 0.95) is safe
@@ -47,10 +48,17 @@ def test_the_start_lies_over_what_the_name_says(folder: Path, name: str, safe: b
 
 def test_both_begin_at_the_same_place(folder: Path) -> None:
     meadow, crowded = (worlds.load(folder, name) for name in ('meadow', 'crowded'))
-    assert (meadow.start_east_m, meadow.start_north_m) == (
-        crowded.start_east_m,
-        crowded.start_north_m,
+    assert (meadow.origin_east_m, meadow.origin_north_m) == (
+        crowded.origin_east_m,
+        crowded.origin_north_m,
     )
+
+
+def test_flights_begin_away_from_the_origin_over_the_same_ground(folder: Path) -> None:
+    away, at_origin = (worlds.load(folder, 'meadow', begin) for begin in (worlds.BEGIN_M, (0, 0)))
+    assert min(abs(each) for each in away.begin_m) > 10.0
+    there, here = away.world.pixel(*away.begin_m), at_origin.world.pixel(0.0, 0.0)
+    assert there == pytest.approx(here)
 
 
 def test_another_world_is_refused(folder: Path) -> None:

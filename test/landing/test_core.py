@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from peace_ros.domain import Camera, Heatmap, Pose, Site, Telemetry
+from peace_ros.domain import Camera, DepthImage, Heatmap, Pose, Site, Telemetry
 from peace_ros.landing import LandingCore, LandingParameters, State, Verdict, VerdictKind
 from peace_ros.landing.guidance import over_site
 from peace_ros.landing.states import STILL_STATES
@@ -62,6 +62,67 @@ def test_the_first_state_begins_with_the_first_step_also_on_the_clock_of_the_day
     later = core.step(begin_ns + S // 2, None, inf)
     assert later.state is State.IDLE
     assert later.time_in_state_s == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize('place', [(-60.0, -40.0), (-12.0, 3.0), (500.0, 0.0), (0.0, -900.0)])
+def test_stands_wherever_it_is_before_anything_was_seen_and_after_the_map_was_dropped(core, place):
+    def there(time_s: float) -> Telemetry:
+        at = replace(pose_at(time_s), north_m=place[0], east_m=place[1])
+        return telemetry_at(time_s, pose=at)
+
+    core.engage()
+    assert core.step(S, there(1.0), 0.1).setpoint.is_zero
+    fed(core, 2.0, 6.0)
+    # The position jumps: the map of before says nothing about the ground here.
+    core.add_pose(there(6.0).pose)
+    decision = core.step(6 * S, there(6.0), 0.1)
+    assert decision.verdict.kind is VerdictKind.NO_ZONE
+    assert decision.setpoint.is_zero
+    # No position for a while drops the map too.
+    decision = core.step(12 * S, there(12.0), 0.1)
+    assert decision.state is State.HOLD
+    assert decision.setpoint.is_zero
+
+
+def test_says_why_a_position_is_not_believed(core):
+    fed(core, 1.0, 2.0)
+    core.engage()
+    told = telemetry_at(2.0, pose=None, position_problem='the reported position jumped by 20 m')
+    core.step(2 * S, told, 0.1)
+    decision = core.step(round(2.1 * S), told, 0.1)
+    assert decision.state is State.HOLD
+    assert decision.reason == 'the reported position jumped by 20 m'
+
+
+def depth_at(time_s: float, step_m: float = 0.0) -> DepthImage:
+    depth = np.full((64, 64), 15.0, np.float32)
+    depth[:, 32:] -= step_m
+    return DepthImage(depth, round(time_s * S))
+
+
+def test_depth_waits_for_its_pose_and_closes_the_ground_for_good(core):
+    core.engage()
+    fed(core, 1.0, 6.0)
+    core.add_depth(depth_at(6.1, step_m=3.0))
+    core.add_depth(depth_at(6.1))
+    assert core.step(round(6.0 * S), telemetry_at(6.0), 0.1).counts.get('depth used', 0) == 0
+    core.add_pose(pose_at(6.2))
+    decision = core.step(round(6.2 * S), telemetry_at(6.2), 0.1)
+    assert decision.counts['depth used'] == 1
+    assert decision.counts['depth not newer than the last'] == 1
+    assert core.safety_map.score_around(0.0, 0.0, 1.5, round(6.2 * S))[0] == 0.0
+    assert decision.setpoint.v_down_m_s == 0.0
+    decision = fed(core, 6.4, 9.0)
+    assert decision.setpoint.v_down_m_s == 0.0, 'no heatmap opens it'
+    assert core.safety_map.score_around(0.0, 0.0, 1.5, 9 * S)[0] == 0.0
+
+
+def test_depth_from_a_time_without_a_pose_is_counted_and_left_out(core):
+    fed(core, 1.0, 3.0)
+    core.add_depth(depth_at(0.5, step_m=3.0))
+    decision = fed(core, 3.0, 4.0)
+    assert decision.counts['depth: older than every pose'] == 1
+    assert core.safety_map.score_around(0.0, 0.0, 1.5, 4 * S)[0] > 0.5
 
 
 def test_holds_and_says_why_before_anything_was_seen(core):

@@ -72,6 +72,36 @@ def test_a_heatmap_of_another_encoding_is_refused():
         messages.heatmap_from_image(message)
 
 
+def depth_message(depth: np.ndarray, pad: int = 0, order: str = '<f4') -> Image:
+    rows = np.ascontiguousarray(depth.astype(order)).view(np.uint8)
+    padded = np.pad(rows, ((0, 0), (0, pad)), constant_values=255)
+    message = messages.image_message(np.zeros((1, 1), np.uint8), 'mono8', STAMP)
+    message.encoding, message.is_bigendian = '32FC1', int(order == '>f4')
+    message.height, message.width, message.step = *depth.shape, padded.shape[1]
+    message.data = array('B', padded.tobytes())
+    return message
+
+
+@pytest.mark.parametrize(('pad', 'order'), [(0, '<f4'), (8, '<f4'), (0, '>f4')])
+def test_a_depth_image_keeps_metres_and_stamp(pad, order):
+    depth = np.array([[1.5, 20.0, np.inf], [0.0, np.nan, 3.25]], np.float32)
+    back = messages.depth_from_image(depth_message(depth, pad, order))
+    np.testing.assert_array_equal(back.depth_m, depth)
+    assert back.depth_m.dtype == np.float32
+    assert back.stamp_ns == STAMP
+
+
+def test_a_depth_image_of_millimetres_or_with_bytes_missing_is_refused():
+    millimetres = depth_message(np.ones((2, 2), np.float32))
+    millimetres.encoding = '16UC1'
+    with pytest.raises(ImageError, match='32FC1'):
+        messages.depth_from_image(millimetres)
+    cut = depth_message(np.ones((2, 2), np.float32))
+    cut.data = cut.data[:8]
+    with pytest.raises(ImageError, match='8 bytes came, 16 fit'):
+        messages.depth_from_image(cut)
+
+
 def test_a_prompt_keeps_template_scores_and_stamp():
     ranking = {
         'environment': (RankedWord('heat-map', 0.31), RankedWord('next to/on top of', -0.25)),

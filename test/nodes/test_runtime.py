@@ -68,6 +68,45 @@ def test_nothing_is_destroyed_under_a_callback(threads):
     assert sorted(rest.splitlines()) == ['closed', 'published']
 
 
+BUSY_NODE = """
+import gc, sys
+from rclpy.task import Future
+from peace_ros.nodes.runtime import PeaceNode, run
+
+class BusyNode(PeaceNode):
+    turns = 0
+
+    def __init__(self):
+        super().__init__('busy')
+        self.timer = self.create_timer(0.002, self.turn)
+
+    def turn(self):
+        self.turns += 1
+        if self.turns == 300:
+            waiting = [each for each in gc.get_objects() if isinstance(each, Future)]
+            print('callbacks', max(len(each._callbacks) for each in waiting), flush=True)
+            self.end()
+
+sys.exit(run(BusyNode, threads=int(sys.argv[1])))
+"""
+
+
+@pytest.mark.parametrize('threads', [1, 2])
+def test_a_node_that_spins_for_long_gathers_nothing(threads):
+    done = subprocess.run(
+        [sys.executable, '-c', BUSY_NODE, str(threads)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    name, callbacks = done.stdout.split()
+    assert name == 'callbacks'
+    assert int(callbacks) <= 2
+
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_ends_quietly_on_a_signal(number):
     with start('prompt_generator', '-p', 'template:=DD') as process:

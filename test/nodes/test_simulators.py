@@ -104,14 +104,21 @@ def test_flies_by_twist_and_publishes_the_pose(bench, world):
     bench.until(lambda: bool(images))
 
 
-def test_follows_an_autopilot_and_publishes_its_pose(bench, world, take_off):
+@pytest.mark.parametrize('origin_m', [0.0, -9.0])
+def test_follows_an_autopilot_and_publishes_its_pose(bench, world, take_off, origin_m):
     images = bench.heard(Image, 'image', qos.IMAGE_IN)
     poses = bench.heard(PoseStamped, 'pose', qos.POSE)
     start = {'start_north_m': 12.0, 'start_east_m': -7.0, 'start_heading_deg': 40.0}
+    start['origin_above_home_m'] = origin_m
     with AutopilotSim(AutopilotParameters(port=0, speed=25.0, **start)) as sim:
         node = bench.run(SatelliteViewNode, world=world, gsd=0.5, pose_mavlink=sim.url)
         take_off(sim.url, 30.0)
-        bench.until(lambda: bool(poses) and pose_from_message(poses[-1]).altitude_agl_m > 28.0)
+
+        def agrees():
+            told_m = pose_from_message(poses[-1]).altitude_agl_m if poses else 0.0
+            return told_m > 28.0 and abs(told_m - sim.truth().altitude_agl_m) < 0.5
+
+        bench.until(agrees)
         truth, pose = sim.truth(), pose_from_message(poses[-1])
     assert (pose.north_m, pose.east_m) == pytest.approx((truth.north_m, truth.east_m), abs=0.5)
     same = np.dot(pose.quaternion_ned_frd, truth.quaternion_ned_frd)
@@ -121,6 +128,22 @@ def test_follows_an_autopilot_and_publishes_its_pose(bench, world, take_off):
     assert all(later > earlier for earlier, later in pairwise(stamps))
     assert abs(node.clock_ns() - stamps[-1]) < 5e9
     assert {stamp_ns(each) for each in images} & set(stamps)
+
+
+def test_the_pose_of_a_signing_autopilot_needs_its_key(bench, world, tmp_path, capfd):
+    key_file = tmp_path / 'key'
+    key_file.write_text('a passphrase for the tests')
+    poses = bench.heard(PoseStamped, 'pose', qos.POSE)
+    signed = AutopilotParameters(port=0, speed=25.0, signing_key_file=str(key_file))
+    with AutopilotSim(signed) as sim:
+        options = {'world': world, 'gsd': 0.5, 'pose_mavlink': sim.url}
+        bench.run(SatelliteViewNode, **options)
+        bench.until(lambda: 'no HEARTBEAT of an autopilot' in capfd.readouterr().err)
+        assert not poses
+        assert sim.refused_signatures > 0
+        bench.run(SatelliteViewNode, **options, pose_signing_key_file=str(key_file))
+        bench.until(lambda: bool(poses))
+    assert (tmp_path / 'key.254.time').is_file()
 
 
 def test_a_world_that_is_missing_is_refused(bench):

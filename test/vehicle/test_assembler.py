@@ -7,9 +7,10 @@ from math import cos, inf, nan, radians
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from peace_ros.domain.geometry import quaternion_from_euler
 from peace_ros.vehicle.assembler import Assembler
 from peace_ros.vehicle.clock import TimeMap
-from peace_ros.vehicle.dialects import ArduPilot
+from peace_ros.vehicle.dialects import ArduPilot, Px4
 from peace_ros.vehicle.parameters import VehicleParameters
 
 SECOND = 10**9
@@ -95,12 +96,52 @@ def test_a_boot_time_that_goes_back_is_a_reboot_and_forgets_the_place(assembler)
     assert assembler.telemetry(0).pose is None
 
 
-def test_altitude_is_above_home(assembler):
-    home = mavlink.MAVLink_home_position_message(0, 0, 0, 0, 0, -4.0, [1, 0, 0, 0], 0, 0, 0)
-    assembler.take(home, 0, 0)
+def test_a_boot_time_that_runs_over_costs_a_moment_and_no_more(assembler):
+    for at_ms in (2**32 - 40, 2**32 - 10, 20, 50):
+        assembler.take(position(at_ms), 0, 0)
+        assembler.take(attitude(at_ms), 0, 0)
+    assert assembler.reboots == 1
+    assert assembler.late == 0
+    assert assembler.telemetry(0).pose is not None
+
+
+def home(msl_m=0.0, down_m=0.0):
+    msl_mm = round(msl_m * 1000)
+    return mavlink.MAVLink_home_position_message(0, 0, msl_mm, 0, 0, down_m, [1, 0, 0, 0], 0, 0, 0)
+
+
+def origin(msl_m):
+    return mavlink.MAVLink_gps_global_origin_message(0, 0, round(msl_m * 1000))
+
+
+def altitude_of(assembler):
     assembler.take(position(), 0, 0)
     assembler.take(attitude(), 0, 0)
-    assert assembler.telemetry(0).pose.altitude_agl_m == pytest.approx(26.0)
+    return assembler.telemetry(0).pose.altitude_agl_m
+
+
+def test_altitude_is_above_home_where_px4_says_it_is():
+    assembler = Assembler(Px4(), VehicleParameters())
+    assembler.take(home(500.0, -4.0), 0, 0)
+    assert altitude_of(assembler) == pytest.approx(26.0)
+
+
+@pytest.mark.parametrize('origin_first', [True, False])
+def test_altitude_is_above_home_where_the_origin_lies_higher(assembler, origin_first):
+    said = [origin(587.0), home(584.0)]
+    for message in said if origin_first else reversed(said):
+        assembler.take(message, 0, 0)
+    assert altitude_of(assembler) == pytest.approx(33.0), '30 m above the origin, 3 m above home'
+
+
+def test_an_origin_first_heard_of_in_flight_corrects_the_altitude(assembler):
+    assembler.take(heartbeat(4), 0, 0)
+    assembler.take(mavlink.MAVLink_extended_sys_state_message(0, 2), 0, 0)
+    assembler.take(home(584.0), 0, 0)
+    assert altitude_of(assembler) == pytest.approx(30.0)
+    assembler.take(origin(587.0), 0, 0)
+    assembler.take(attitude(1100), 0, 0)
+    assert assembler.telemetry(0).pose.altitude_agl_m == pytest.approx(33.0)
 
 
 def range_message(distance_cm, orientation=25):
@@ -138,7 +179,9 @@ def test_nothing_is_believed_of_an_autopilot_whose_heartbeat_is_silent(assembler
         assembler.take(attitude(1000 * second), 0, second * SECOND)
         known = assembler.telemetry(second * SECOND).pose is not None
         assert known == (second < 4), 'its mode may have changed since'
-    assert assembler.telemetry(4 * SECOND).in_control, 'silence is no takeover'
+    told = assembler.telemetry(4 * SECOND)
+    assert told.in_control, 'silence is no takeover'
+    assert 'HEARTBEAT is 4.0 s old' in told.position_problem
 
 
 def test_what_comes_twice_or_late_is_dropped(assembler):
@@ -170,7 +213,7 @@ def test_a_jump_is_not_believed_while_we_fly(assembler):
     assert assembler.poses
     assembler.poses.clear()
     assert jump(assembler) is None
-    assert 'jumped by 20.0 m' in assembler.position_problem(0)
+    assert 'jumped by 20.0 m' in assembler.telemetry(0).position_problem
     assert not assembler.poses, 'the map must not see it either'
     assembler.take(heartbeat(4), 0, 5 * SECOND)
     assembler.take(position(9000), 0, 5 * SECOND)
@@ -201,18 +244,50 @@ def test_battery_is_a_part_of_one_or_unknown(assembler, said, remaining):
     assert assembler.telemetry(0).battery_remaining == remaining
 
 
-def test_a_home_that_moves_in_flight_does_not_move_the_ground(assembler):
-    def home(down_m):
-        return mavlink.MAVLink_home_position_message(0, 0, 0, 0, 0, down_m, [1, 0, 0, 0], 0, 0, 0)
-
+@pytest.mark.parametrize('moved', [home(15.0), origin(-15.0)])
+def test_a_home_that_moves_in_flight_does_not_move_the_ground(assembler, moved):
+    assembler.take(origin(0.0), 0, 0)
     assembler.take(home(0.0), 0, 0)
     assembler.take(heartbeat(4), 0, 0)
     assembler.take(mavlink.MAVLink_extended_sys_state_message(0, 2), 0, 0)
-    assembler.take(home(-15.0), 0, 0)
-    assembler.take(position(), 0, 0)
-    assembler.take(attitude(), 0, 0)
-    assert assembler.telemetry(0).pose.altitude_agl_m == pytest.approx(30.0)
+    assembler.take(moved, 0, 0)
+    assert altitude_of(assembler) == pytest.approx(30.0)
     assert assembler.rejected == 1
+
+
+def height(boot_ms, above_m, climb_m_s=0.0):
+    return mavlink.MAVLink_global_position_int_message(
+        boot_ms, 0, 0, 0, round(above_m * 1000), 0, 0, round(-climb_m_s * 100), 0
+    )
+
+
+def test_without_a_position_poses_tell_attitude_and_altitude_only(assembler):
+    assembler.take(height(1000, 40.0, climb_m_s=-2.0), 0, 0)
+    assembler.take(attitude(1100, yaw=0.5), 99, 0)
+    (pose,) = assembler.poses
+    assert not pose.has_position
+    assert (pose.stamp_ns, pose.altitude_agl_m) == (99, pytest.approx(39.8))
+    assert pose.quaternion_ned_frd == quaternion_from_euler(0.0, 0.0, 0.5)
+    assert assembler.telemetry(0).pose is None, 'nobody flies by it'
+
+
+def test_the_altitude_of_px4_needs_no_position_either():
+    assembler = Assembler(Px4(), VehicleParameters())
+    assembler.take(mavlink.MAVLink_altitude_message(10**6, 0, 0, 0, 40.0, nan, nan), 0, 0)
+    assembler.take(attitude(1000), 99, 0)
+    assert assembler.poses[0].altitude_agl_m == pytest.approx(40.0)
+    assembler.take(mavlink.MAVLink_altitude_message(10**6, 0, 0, 0, nan, nan, nan), 0, 0)
+    assembler.take(attitude(1050), 100, 0)
+    assert len(assembler.poses) == 1
+
+
+def test_an_old_altitude_makes_no_pose_and_a_position_makes_a_whole_one(assembler):
+    assembler.take(height(1000, 40.0), 0, 0)
+    assembler.take(attitude(2500), 99, int(1.5 * SECOND))
+    assert not assembler.poses
+    assembler.take(position(2600), 0, int(1.6 * SECOND))
+    assembler.take(attitude(2600), 100, int(1.6 * SECOND))
+    assert [pose.has_position for pose in assembler.poses] == [True]
 
 
 def test_poses_get_the_moment_at_which_they_were_true():

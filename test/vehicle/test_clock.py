@@ -55,6 +55,19 @@ def test_a_step_of_a_clock_is_followed_after_three_answers():
     assert clock.steps == 1
 
 
+def test_after_a_standstill_the_moment_of_receipt_counts_until_the_new_offset_is_known():
+    clock = TimeMap()
+    now_ns = feed(clock, 7 * SECOND, begin_ns=10**15, jitter_ms=0.0)
+    assert not clock.wants_more
+    lost_ns = 400 * MS
+    feed(clock, 7 * SECOND + lost_ns, begin_ns=now_ns, count=1, jitter_ms=0.0)
+    assert clock.wants_more, 'three answers settle it, and they are asked for soon'
+    boot_ms = (now_ns + SECOND - 7 * SECOND - lost_ns) // MS
+    assert clock.stamp_ns(boot_ms, now_ns + SECOND + MS) == now_ns + SECOND + MS
+    feed(clock, 7 * SECOND + lost_ns, begin_ns=now_ns + SECOND, count=4, jitter_ms=0.0)
+    assert abs(clock.offset_ns - 7 * SECOND - lost_ns) < MS
+
+
 @pytest.mark.parametrize('speed', [0.5, 1.2, 5.0])
 def test_clocks_of_different_speed_have_no_offset(speed):
     clock = TimeMap()

@@ -58,6 +58,21 @@ def test_says_when_nothing_fits(wanted, autopilot):
         choose_dialect(wanted, autopilot)
 
 
+@pytest.mark.parametrize(
+    ('autopilot', 'kind', 'named'),
+    [(3, 1, 'fixed-wing'), (3, 10, 'ground vehicle'), (3, 20, 'VTOL'), (12, 12, 'submarine')],
+)
+def test_what_does_not_hover_is_refused(autopilot, kind, named):
+    with pytest.raises(VehicleError, match=named):
+        choose_dialect('auto', autopilot, vehicle_type=kind)
+
+
+@pytest.mark.parametrize('kind', [0, 2, 3, 4, 13, 14, 15, 29, 35])
+def test_multicopters_helicopters_and_those_that_do_not_say_are_taken(kind):
+    assert choose_dialect('auto', 3, vehicle_type=kind).name == 'ardupilot'
+    assert choose_dialect('auto', 12, vehicle_type=kind).name == 'px4'
+
+
 def test_an_unknown_mode_names_the_known_ones():
     with pytest.raises(VehicleError, match=r"'HOVER'.*GUIDED"):
         ArduPilot().mode_command('HOVER')

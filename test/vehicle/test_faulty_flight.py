@@ -4,6 +4,7 @@
 
 import math
 import socket
+import threading
 import time
 
 import pytest
@@ -11,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.domain import Setpoint
 from peace_ros.simulation.autopilot.faults import inject
-from peace_ros.vehicle import SenderState, SetpointSender, open_vehicle
+from peace_ros.vehicle import SenderState, SetpointSender, VehicleParameters, open_vehicle
 from peace_ros.vehicle.dialects import ArduPilot, Px4
 
 
@@ -48,6 +49,42 @@ def test_a_mode_that_changed_during_the_silence_is_a_takeover(flying, eventually
     sim.pilot_mode('LOITER')
     inject(sim, 'mend')
     assert eventually(lambda: link.taken_over, 3.0)
+
+
+@pytest.mark.parametrize('mode', ['LOITER', 'BRAKE', 'LAND', 'RTL'])
+def test_a_ground_station_that_takes_over_has_the_last_word(sent, eventually, mode):
+    sim, link, sender = sent
+    station = open_vehicle(sim.url, parameters=VehicleParameters(system_id=255))
+
+    def decides():
+        sender.submit(Setpoint(0, v_north_m_s=1.0))
+
+    def heard_within(seconds):
+        count, last = sim.flight.setpoints, 0.0
+        begun = time.monotonic()
+        while time.monotonic() - begun < seconds:
+            decides()
+            if sim.flight.setpoints != count:
+                count, last = sim.flight.setpoints, time.monotonic() - begun
+            time.sleep(0.002)
+        return last
+
+    assert eventually(lambda: decides() or sim.flight.setpoints > 5)
+    assert station.set_mode('GUIDED'), 'chosen again it changes nothing, and nobody can see it'
+    assert heard_within(0.3) > 0.0
+    assert not link.taken_over
+    asking = threading.Thread(target=station.set_mode, args=(mode,))
+    asking.start()
+    assert eventually(lambda: decides() or sim.mode_name == mode)
+    assert heard_within(1.0) < 0.3
+    asking.join()
+    assert link.taken_over
+    assert not link.request_control()
+    assert sim.mode_name in {mode, 'LAND'}, 'RTL lands at home'
+    assert station.set_mode('GUIDED')
+    assert eventually(lambda: link.telemetry().in_control)
+    assert heard_within(0.5) == 0.0, 'given back is not engaged'
+    station.close()
 
 
 def test_a_reboot_in_flight_is_a_takeover(flying, eventually):
@@ -98,6 +135,58 @@ def test_a_bad_line_is_flown_through(flying, eventually):
     assert not link.taken_over
 
 
+@pytest.mark.parametrize('autopilot', ['ardupilot', 'px4'])
+def test_altitude_is_above_home_wherever_the_origin_lies(hovering, eventually, autopilot):
+    with hovering(20.0, 10.0, autopilot=autopilot, origin_above_home_m=-7.0) as sim:
+        link = open_vehicle(sim.url)
+
+        def agrees():
+            pose = link.telemetry().pose
+            return pose is not None and abs(pose.altitude_agl_m - sim.truth().altitude_agl_m) < 0.3
+
+        assert eventually(agrees)
+        link.close()
+
+
+def test_attitude_and_altitude_go_on_when_the_position_is_lost(flying, eventually):
+    sim, link = flying
+    sim.lose_gps()
+    assert eventually(lambda: link.telemetry().pose is None)
+    link.take_poses()
+    assert eventually(lambda: any(not pose.has_position for pose in link.take_poses()))
+    bare = []
+    assert eventually(lambda: bare.extend(link.take_poses()) or len(bare) > 20)
+    assert not any(pose.has_position for pose in bare)
+    assert bare[-1].altitude_agl_m == pytest.approx(sim.truth().altitude_agl_m, abs=1.5)
+    assert [pose.stamp_ns for pose in bare] == sorted({pose.stamp_ns for pose in bare})
+
+
+@pytest.mark.parametrize('speed', [0.1, 0.7, 4.0])
+def test_a_simulation_slower_or_faster_than_time_is_believed(hovering, eventually, speed):
+    with hovering(20.0, speed) as sim:
+        link = open_vehicle(sim.url, parameters=VehicleParameters(heartbeat_limit_s=20.0))
+        assert eventually(lambda: link.telemetry().pose is not None, 15.0)
+        link.take_poses()
+        begun_ns, high_m = time.monotonic_ns(), sim.truth().altitude_agl_m
+        problems, told, poses = set(), [], []
+        while time.monotonic_ns() - begun_ns < 5e9 and sim.truth().altitude_agl_m > 8.0:
+            link.send_velocity(Setpoint(0, v_down_m_s=1.0))
+            told.append(link.telemetry().pose)
+            problems.add(link.position_problem)
+            poses += link.take_poses()
+            time.sleep(0.04)
+        assert problems == {''}
+        assert None not in told
+        assert sim.truth().altitude_agl_m < high_m - 0.02
+        ended_ns = time.monotonic_ns()
+        ages_s = [(ended_ns - pose.stamp_ns) / 1e9 for pose in poses]
+        assert ages_s == sorted(ages_s, reverse=True)
+        assert ages_s[-1] < 1.0
+        span_s = (poses[-1].stamp_ns - poses[0].stamp_ns) / 1e9
+        assert span_s == pytest.approx((ended_ns - begun_ns) / 1e9, abs=1.0)
+        link.close()
+
+
 def test_a_second_companion_is_not_believed(flying, eventually):
     sim, link = flying
     other = open_vehicle(sim.url)
@@ -108,7 +197,7 @@ def test_a_second_companion_is_not_believed(flying, eventually):
     line.sendto(beat.pack(voice), ('127.0.0.1', int(sim.url.rpartition(':')[2])))
     assert other.set_mode('LOITER')
     assert eventually(lambda: link.taken_over), 'somebody else chose a mode: it is theirs now'
-    assert link.ignored == before
+    assert eventually(lambda: link.ignored > before), 'the autopilot hands on what others say'
     other.close()
     line.close()
 

@@ -116,6 +116,20 @@ def test_flies_over_tcp_and_finds_back_after_the_autopilot_was_restarted(eventua
     sim.close()
 
 
+def test_a_port_that_serves_somebody_else_is_said_to_and_is_ours_when_he_has_gone(eventually):
+    port = free_tcp_port()
+    sim = AutopilotSim(AutopilotParameters(port=0, serial_port=port, speed=40.0))
+    sim.start()
+    station = open_vehicle(f'tcp:127.0.0.1:{port}')
+    with pytest.raises(VehicleError, match='serves one client'):
+        open_vehicle(f'tcp:127.0.0.1:{port}', timeout_s=1.0)
+    station.close()
+    link = open_vehicle(f'tcp:127.0.0.1:{port}', timeout_s=5.0)
+    assert eventually(lambda: link.telemetry().pose is not None, 8.0)
+    link.close()
+    sim.close()
+
+
 def test_follows_an_autopilot_to_a_new_address_after_its_silence(
     free_port, mock_autopilot, eventually, monkeypatch
 ):

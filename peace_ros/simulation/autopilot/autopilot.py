@@ -95,7 +95,7 @@ class AutopilotSim:
     @property
     def tcp_url(self) -> str:
         """Where a companion connects to by TCP; empty when there is no such port."""
-        port = self.parameters.tcp_port
+        port = self.parameters.tcp_port or self.parameters.serial_port
         return f'tcp:{self.parameters.host}:{port}' if port else ''
 
     @property
@@ -133,6 +133,8 @@ class AutopilotSim:
             if self._faults is not None:
                 self._faults.poll(self)
             self._server.receive(self._flight)
+            if self._server.waits_for_client:
+                return
             self._remainder_s += dt_s
             while self._remainder_s >= tick - 1e-9:
                 self._remainder_s -= tick

@@ -84,6 +84,14 @@ class Flight:
         return truth[0] + offset[0], truth[1] + offset[1], truth[2] + offset[2]
 
     @property
+    def last_place_m(self) -> tuple[float, float, float]:
+        """Position, or the last known place at the barometer's height while there is none."""
+        if self.has_position:
+            return self.position_m
+        north, east, _ = self._last_position_m
+        return north, east, self.physics.down_m
+
+    @property
     def landed_state(self) -> LandedState:
         """What EXTENDED_SYS_STATE says."""
         if self.landed:
@@ -108,6 +116,8 @@ class Flight:
         """Advance the clock, the failsafes and the vehicle."""
         self.time_s += dt_s
         failsafe = self.estimator.step(self.time_s)
+        if self.has_position:
+            self._last_position_m = self.position_m
         self._tell_readiness()
         if failsafe and self.armed and not self.landed and RULES[self.mode].needs_position:
             self.say(Severity.CRITICAL, 'EKF Failsafe: changed to LAND Mode')
@@ -214,7 +224,6 @@ class Flight:
         """Take GPS away; the last position is repeated when ``stale``."""
         self.estimator.gps = False
         self.estimator.stale_position = stale
-        self._last_position_m = self.position_m
 
     def restore_gps(self) -> None:
         """Give GPS back."""

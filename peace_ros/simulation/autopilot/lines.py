@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The sockets of the simulated autopilot: one UDP port, and a TCP port when one is wanted."""
+"""The sockets of the simulated autopilot: one UDP port, and TCP ports when they are wanted."""
 
 from __future__ import annotations
 
@@ -8,17 +8,26 @@ import select
 import socket
 
 from peace_ros.domain.errors import VehicleError
+from peace_ros.simulation.autopilot.serial_ports import RECEIVE_BYTES, Address, SerialPorts
 
-Address = tuple[str, int]
 MAX_DATAGRAMS = 256
 """Datagrams taken in one turn, so that a flood cannot stop the physics."""
-RECEIVE_BYTES = 65535
 
 
 class Lines:
-    """Hears and tells peers by their address; TCP addresses and UDP addresses never meet."""
+    """Hears and tells peers by their address; TCP addresses and UDP addresses never meet.
 
-    def __init__(self, host: str, port: int, tcp_port: int) -> None:
+    Args:
+        host: Address on which it listens.
+        port: UDP port.
+        tcp_port: TCP port for any number of peers; 0: none.
+        serial_port: First of the TCP ports that serve one peer each; 0: none.
+
+    Raises:
+        VehicleError: A port is taken.
+    """
+
+    def __init__(self, host: str, port: int, tcp_port: int = 0, serial_port: int = 0) -> None:
         self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._listener: socket.socket | None = None
         self._connections: dict[Address, socket.socket] = {}
@@ -35,6 +44,16 @@ class Lines:
                 self._udp.close()
                 raise VehicleError(_taken('TCP', host, tcp_port, error)) from error
             self._listener.setblocking(False)
+        try:
+            self._serial = SerialPorts(host, serial_port)
+        except OSError as error:
+            self._close_network()
+            raise VehicleError(_taken('TCP', host, serial_port, error)) from error
+
+    @property
+    def waits_for_client(self) -> bool:
+        """Nobody has come to the first serial port yet, and the boot waits for that."""
+        return self._serial.waits_for_client
 
     @property
     def port(self) -> int:
@@ -44,7 +63,12 @@ class Lines:
     def wait(self, seconds: float) -> None:
         """Sleep until something arrives, at most so long."""
         listening = [] if self._listener is None else [self._listener]
-        sockets = [self._udp, *listening, *self._connections.values()]
+        sockets = [
+            self._udp,
+            *listening,
+            *self._connections.values(),
+            *self._serial.sockets,
+        ]
         select.select(sockets, [], [], max(0.0, seconds))
 
     def hear(self) -> list[tuple[Address, bytes, bool]]:
@@ -70,10 +94,13 @@ class Lines:
                 heard.append((address, data, False))
             else:
                 self.hang_up(address)
-        return heard
+        return heard + [(address, data, False) for address, data in self._serial.hear()]
 
     def tell(self, address: Address, data: bytes) -> bool:
         """Send; False when it was lost."""
+        serial = self._serial.find(address)
+        if serial is not None:
+            return serial.tell(data)
         connection = self._connections.get(address)
         try:
             if connection is None:
@@ -90,18 +117,21 @@ class Lines:
             return False
         return True
 
-    def is_connection(self, address: Address) -> bool:
-        """Whether the peer came by TCP."""
-        return address in self._connections
-
     def hang_up(self, address: Address) -> None:
         """Close a TCP connection."""
+        serial = self._serial.find(address)
+        if serial is not None:
+            serial.hang_up()
         connection = self._connections.pop(address, None)
         if connection is not None:
             connection.close()
 
     def close(self) -> None:
         """Release the ports."""
+        self._serial.close()
+        self._close_network()
+
+    def _close_network(self) -> None:
         for address in list(self._connections):
             self.hang_up(address)
         if self._listener is not None:

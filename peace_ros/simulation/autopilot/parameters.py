@@ -23,6 +23,13 @@ class AutopilotParameters:
     tcp_port: int = parameter(
         0, 'TCP port of the MAVLink server besides; 0 opens none.', low=0, high=65535
     )
+    serial_port: int = parameter(
+        0,
+        "First of the TCP ports of ArduPilot's own simulation (5760; also 5762 and 5763): one "
+        'client each, and it boots when the first client has come; 0 opens none.',
+        low=0,
+        high=65532,
+    )
     fault_port: int = parameter(
         0,
         'UDP port, on the loopback address, on which faults can be injected; 0 opens none.',
@@ -52,6 +59,13 @@ class AutopilotParameters:
     )
     home_altitude_msl_m: float = parameter(
         35.0, 'Altitude of the flat ground above sea level.', unit='m', low=-500.0, high=9000.0
+    )
+    origin_above_home_m: float = parameter(
+        0.0,
+        "Height of the local frame's origin above home: LOCAL_POSITION_NED tells z from there.",
+        unit='m',
+        low=-500.0,
+        high=500.0,
     )
     wind_to_north_m_s: float = parameter(
         0.0, 'Mean wind, the way the air moves, to the north.', unit='m/s', low=-20.0, high=20.0

@@ -13,10 +13,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from peace_ros.simulation.autopilot.commands import Params, run_command, run_message
 from peace_ros.simulation.autopilot.disturbance import BadLine, Disturbance
 from peace_ros.simulation.autopilot.flight import Flight
-from peace_ros.simulation.autopilot.lines import Address, Lines
+from peace_ros.simulation.autopilot.lines import Lines
 from peace_ros.simulation.autopilot.modes import Mode, Result, Severity
 from peace_ros.simulation.autopilot.parameters import AutopilotParameters
 from peace_ros.simulation.autopilot.personality import Personality
+from peace_ros.simulation.autopilot.serial_ports import Address
 from peace_ros.simulation.autopilot.signing import Signing
 from peace_ros.simulation.autopilot.streams import Streams
 
@@ -73,12 +74,19 @@ class MavlinkServer:
         self._heartbeat_due_s = 0.0
         self._timesync_due_s = TIMESYNC_S
         self.rejected_bytes = 0
-        self._lines = Lines(parameters.host, parameters.port, parameters.tcp_port)
+        self._lines = Lines(
+            parameters.host, parameters.port, parameters.tcp_port, parameters.serial_port
+        )
 
     @property
     def port(self) -> int:
         """UDP port that it listens on."""
         return self._lines.port
+
+    @property
+    def waits_for_client(self) -> bool:
+        """The autopilot does not boot before somebody is there."""
+        return self._lines.waits_for_client
 
     @property
     def refused_signatures(self) -> int:
@@ -174,6 +182,8 @@ class MavlinkServer:
 
     def _handle(self, flight: Flight, peer: Peer, message: Any) -> None:
         target = getattr(message, 'target_system', 0)
+        if target == 0:
+            self._forward(peer, message)
         if target not in {0, self._parameters.system_id}:
             return
         kind = message.get_type()
@@ -288,6 +298,17 @@ class MavlinkServer:
             return
         data = message.pack(peer.codec)
         peer.codec.seq = (peer.codec.seq + 1) % 256
+        self._tell_bytes(peer, data)
+
+    def _forward(self, sender: Peer, message: Any) -> None:
+        """Hand what is meant for anybody to the other peers, as a real autopilot does."""
+        if self._disturbance.silent:
+            return
+        for peer in list(self._peers.values()):
+            if peer is not sender:
+                self._tell_bytes(peer, bytes(message.get_msgbuf()))
+
+    def _tell_bytes(self, peer: Peer, data: bytes) -> None:
         for leaving in peer.outward.carry(data):
             if not self._lines.tell(peer.address, leaving):
                 # A full buffer loses a datagram; a TCP line that stalls is closed.

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, degrees, isfinite, pi, radians
+from math import cos, degrees, isfinite, nan, pi, radians
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -39,7 +39,8 @@ class Streams:
     ) -> None:
         self._parameters = parameters
         self._disturbance = disturbance or Disturbance()
-        estimator = (personality or Personality()).estimator_message
+        self._personality = personality or Personality()
+        estimator = self._personality.estimator_message
         self._builders: dict[int, Callable[[Flight], Any]] = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
             mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self._local_position_ned,
@@ -51,9 +52,12 @@ class Streams:
             mavlink.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
             mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: self._distance_sensor,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: self.home_position,
+            mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self._gps_global_origin,
             mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
             estimator: ekf_status if estimator == EKF_STATUS else estimator_status,
         }
+        if self._personality.is_px4:
+            self._builders[mavlink.MAVLINK_MSG_ID_ALTITUDE] = self._altitude
 
     def knows(self, message_id: int) -> bool:
         """Whether this message can be asked for."""
@@ -69,13 +73,15 @@ class Streams:
             return None
         north, east, down = flight.home_m
         latitude, longitude = self._geodetic(north, east)
+        # ArduPilot fills in where home is on the globe only; its local position says nothing.
+        local = (0.0, 0.0, 0.0)
+        if self._personality.is_px4:
+            local = (north, east, down + self._parameters.origin_above_home_m)
         return mavlink.MAVLink_home_position_message(
             latitude,
             longitude,
             round(self._parameters.home_altitude_msl_m * 1000),
-            north,
-            east,
-            down,
+            *local,
             [1.0, 0.0, 0.0, 0.0],
             0.0,
             0.0,
@@ -90,10 +96,11 @@ class Streams:
         longitude = p.home_longitude_deg + east_m / (METRES_PER_DEGREE * shrink)
         return round(latitude * 1e7), round(longitude * 1e7)
 
-    def _reported(self, flight: Flight) -> tuple[Vector, Vector]:
+    def _reported(self, flight: Flight, at_m: Vector | None = None) -> tuple[Vector, Vector]:
         d = self._disturbance
+        position_m = flight.position_m if at_m is None else at_m
         return (
-            d.reported_position(flight.position_m, self._parameters.home_altitude_msl_m),
+            d.reported_position(position_m, self._parameters.home_altitude_msl_m),
             d.reported_velocity(flight.physics.velocity_ned_m_s),
         )
 
@@ -103,9 +110,30 @@ class Streams:
     def _local_position_ned(self, flight: Flight) -> Any:
         if not flight.estimator.reports_position(flight.time_s):
             return None
-        position, velocity = self._reported(flight)
+        (north, east, down), velocity = self._reported(flight)
+        down += self._parameters.origin_above_home_m
         return mavlink.MAVLink_local_position_ned_message(
-            self._boot_ms(flight), *position, *velocity
+            self._boot_ms(flight), north, east, down, *velocity
+        )
+
+    def _gps_global_origin(self, flight: Flight) -> Any:
+        if not flight.estimator.has_origin(flight.time_s):
+            return None
+        p = self._parameters
+        latitude, longitude = self._geodetic(0.0, 0.0)
+        altitude_m = p.home_altitude_msl_m + p.origin_above_home_m
+        return mavlink.MAVLink_gps_global_origin_message(
+            latitude, longitude, round(altitude_m * 1000), round(flight.time_s * 1e6)
+        )
+
+    def _altitude(self, flight: Flight) -> Any:
+        """Return ALTITUDE (PX4), which needs the barometer only."""
+        p = self._parameters
+        down = self._reported(flight, flight.last_place_m)[0][2]
+        above_origin = -down - p.origin_above_home_m
+        above_sea = p.home_altitude_msl_m - down
+        return mavlink.MAVLink_altitude_message(
+            round(flight.time_s * 1e6), above_sea, above_sea, above_origin, -down, nan, nan
         )
 
     def _attitude(self, flight: Flight) -> Any:
@@ -121,9 +149,12 @@ class Streams:
         )
 
     def _global_position_int(self, flight: Flight) -> Any:
-        if not flight.estimator.reports_position(flight.time_s):
+        known = flight.estimator.reports_position(flight.time_s)
+        if not known and self._personality.is_px4:
             return None
-        (north, east, down), (v_north, v_east, v_down) = self._reported(flight)
+        # ArduPilot goes on with the last place, and with the barometer's altitude.
+        at_m = flight.position_m if known else flight.last_place_m
+        (north, east, down), (v_north, v_east, v_down) = self._reported(flight, at_m)
         if not isfinite(down):
             return None  # whole millimetres cannot say that
         latitude, longitude = self._geodetic(north, east)

@@ -72,6 +72,35 @@ def test_sends_only_four_kinds_unasked_and_a_heartbeat_each_second(gcs):
     assert kinds.count('HEARTBEAT') == pytest.approx(50, abs=2)
 
 
+def test_home_is_told_on_the_globe_only_and_the_origin_when_asked():
+    sim = AutopilotSim(AutopilotParameters(port=0, start_north_m=3.0, origin_above_home_m=7.0))
+    gcs = GroundStation(sim)
+    gcs.command(511, 32, 200_000)
+    gcs.command(512, 49)
+    assert 'GPS_GLOBAL_ORIGIN' not in {m.get_type() for m in gcs.hear(15.0)}, 'none yet'
+    heard = gcs.hear(30.0)
+    gcs.command(512, 49)
+    told = {m.get_type(): m for m in [*heard, *gcs.hear(1.0)]}
+    home, origin = told['HOME_POSITION'], told['GPS_GLOBAL_ORIGIN']
+    assert (home.x, home.y, home.z) == (0.0, 0.0, 0.0), 'as ArduPilot has it'
+    assert (origin.altitude - home.altitude) / 1000.0 == pytest.approx(7.0)
+    assert told['LOCAL_POSITION_NED'].z == pytest.approx(7.0), 'home is below the origin'
+    gcs.socket.close()
+    sim.close()
+
+
+def test_the_barometer_goes_on_without_a_position(gcs, sim):
+    gcs.hear(45.0)
+    gcs.command(511, 33, 200_000)
+    gcs.hear(1.0)
+    sim.lose_gps()
+    sim.flight.physics.north_m += 50.0
+    sim.flight.physics.down_m = -12.0
+    heard = [m for m in gcs.hear(1.0) if m.get_type() == 'GLOBAL_POSITION_INT']
+    assert heard[0].relative_alt == pytest.approx(12_000, abs=500)
+    assert heard[0].lat == pytest.approx(round((48.858 + 3.0 / 111_319.49) * 1e7), abs=20)
+
+
 def test_delivers_20_hz_in_full_once_asked(gcs):
     gcs.hear(45.0)
     gcs.command(511, 32, 50_000)
