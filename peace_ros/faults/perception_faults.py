@@ -177,7 +177,8 @@ PROMPT = (
         'The prompt generator is killed.',
         Killed('prompt_generator'),
         GOES_ON,
-        'The last prompt is used, and said to be old: goes on.',
+        'One frame waits 0.3 s for its prompt in vain, later ones not at all; the last prompt is '
+        'used, and said to be old: goes on.',
         lasts_s=_UNTIL_HANDOVER_S,
         until_reached=True,
         setting=_WITH_PROMPTS,
@@ -188,7 +189,8 @@ PROMPT = (
         'Prompts come 3 s late.',
         prompt(lambda: tamper.late(3.0)),
         GOES_ON,
-        'Each frame waits 0.3 s for its prompt, then the newest one is used: goes on.',
+        'One frame waits 0.3 s for its prompt in vain, later ones not at all as long as none is in '
+        'time; the newest prompt is used: goes on.',
         lasts_s=_UNTIL_HANDOVER_S,
         until_reached=True,
         setting=_WITH_PROMPTS,

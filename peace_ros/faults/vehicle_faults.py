@@ -317,7 +317,35 @@ PROCESS = (
 
 _SIM_TIME = Setting(sim_time=True)
 
+
+def _autopilot_clock(name: str, words: str, step_s: float, behaviour: str) -> Fault:
+    return Fault(
+        name,
+        'clock',
+        f"The autopilot's own clock steps {words}, without a reboot.",
+        Autopilot('boot_clock', {'step_s': step_s}, undo=''),
+        Expected(reaches=(State.HANDOVER.value,), within_s=60.0, allowed=(*GOING, _HOLD)),
+        behaviour,
+        lasts_s=_UNTIL_HANDOVER_S + 16.0,
+        until_reached=True,
+    )
+
+
 CLOCK = (
+    _autopilot_clock(
+        'autopilot_clock_forward',
+        '30 s ahead',
+        30.0,
+        'Where the clocks do not fit, poses get the moment of receipt, until TIMESYNC has found '
+        'the new offset: goes on, maybe after HOLD.',
+    ),
+    _autopilot_clock(
+        'autopilot_clock_back',
+        '30 s back',
+        -30.0,
+        'It looks like a reboot that left the mode: everything begins anew, and the landing goes '
+        'on, maybe after HOLD.',
+    ),
     Fault(
         'clock_steps_forward',
         'clock',

@@ -38,7 +38,8 @@ class SegmentationOptions:
     )
     prompt_timeout: float = parameter(
         0.3,
-        'A frame waits this long for the prompt made from it, then takes the newest one',
+        'A frame waits this long for the prompt made from it, then takes the newest one; after '
+        'a frame in vain none waits until a prompt is in time again',
         unit='s',
         low=0.0,
         high=10.0,

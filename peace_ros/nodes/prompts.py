@@ -20,10 +20,14 @@ class PromptBoard:
         self._changed = threading.Condition()
         self._prompts: OrderedDict[int, Prompt] = OrderedDict()
         self._closed = False
+        self._in_vain = False
+        self._asked_ns = self._longest_ns = 0
 
     def put(self, prompt: Prompt) -> None:
-        """Add a prompt; the oldest ones are forgotten."""
+        """Add a prompt; the oldest ones are forgotten. One that is in time is waited for again."""
         with self._changed:
+            if self._asked_ns - prompt.stamp_ns <= self._longest_ns:
+                self._in_vain = False
             self._prompts[prompt.stamp_ns] = prompt
             self._prompts.move_to_end(prompt.stamp_ns)
             while len(self._prompts) > _KEPT:
@@ -46,11 +50,15 @@ class PromptBoard:
         """Return the prompt made from the frame of that stamp, else the newest there is.
 
         Waits for it at most the timeout (steady clock), and not at all once a prompt of a later
-        frame is there: the generator has then passed this frame over. None before the first
-        prompt.
+        frame is there: the generator has then passed this frame over. Nor does it wait when the
+        frame before did in vain: a generator that is gone must not make every heatmap late. None
+        before the first prompt.
         """
         with self._changed:
-            self._changed.wait_for(lambda: self._closed or self._decided(stamp_ns), timeout_s)
+            self._asked_ns, self._longest_ns = stamp_ns, round(timeout_s * 1e9)
+            wait_s = 0.0 if self._in_vain else timeout_s
+            self._changed.wait_for(lambda: self._closed or self._decided(stamp_ns), wait_s)
+            self._in_vain = not self._decided(stamp_ns)
             if stamp_ns in self._prompts:
                 return self._prompts[stamp_ns]
             return next(reversed(self._prompts.values()), None)

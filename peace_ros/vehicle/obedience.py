@@ -21,6 +21,9 @@ SPANS_S = (1.5, 3.5)
 at last."""
 LAG_S = 0.5
 """The vehicle is behind what it is told by about this much when it changes its height."""
+CALM_S = 1.0
+"""Nothing is said of sinking until the last climb told is so much older than what is compared: a
+vehicle that climbs has to stop first."""
 LATERAL_SPAN_S = 2.0
 """Sideways ways are compared over this time,"""
 SETTLED_S = 2.5
@@ -37,6 +40,7 @@ LEAST_PART = 0.2
 GAP_S = 0.5
 STEP_M = 3.0
 """No vehicle flies this far between two reports."""
+_MEMORY_S = max(SPANS_S[-1] + LAG_S + CALM_S, LATERAL_SPAN_S + SETTLED_S) + GAP_S
 _REMEDY = 'is not believed; take over, engage again when it is right'
 
 
@@ -95,7 +99,7 @@ class ObedienceWatch:
             flown_s = min(at_s - last.at_s, max(0.0, boot_s - last.boot_s))
             self._told_m = _moved(self._told_m, self._velocity_m_s, flown_s)
         self._marks.append(_Mark(at_s, boot_s, position_m, self._told_m))
-        while at_s - self._marks[0].at_s > LATERAL_SPAN_S + SETTLED_S + GAP_S:
+        while at_s - self._marks[0].at_s > _MEMORY_S:
             self._marks.popleft()
         for span_s in SPANS_S:
             self.problem = self.problem or self._sinks(at_s, span_s)
@@ -112,10 +116,16 @@ class ObedienceWatch:
         sunk_m = end.seen_m[2] - begin.seen_m[2]
         if told_m <= LEAST_M or sunk_m >= LEAST_PART * told_m:
             return ''
+        if self._climbed_since(at_s - span_s - LAG_S - CALM_S):
+            return ''
         return (
             f'the vehicle was told to sink {told_m:.1f} m in {span_s:g} s and reports '
             f'{sunk_m:.1f} m: its altitude {_REMEDY}'
         )
+
+    def _climbed_since(self, begin_s: float) -> bool:
+        recent = (mark for mark in self._marks if mark.at_s >= begin_s)
+        return any(b.told_m[2] < a.told_m[2] for a, b in pairwise(recent))
 
     def _goes_there(self, at_s: float) -> str:
         begin, end = self._before(at_s - LATERAL_SPAN_S), self._marks[-1]

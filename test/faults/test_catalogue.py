@@ -41,7 +41,9 @@ ASKED_FOR = {
         'autopilot_reboots autopilot_refuses pilot_takes_over_landing'
     ),
     'GNSS lost': 'gnss_lost gnss_lost_for_good gnss_lost_position_stale',
-    'clock steps': 'clock_steps_forward clock_steps_back',
+    'clock steps': (
+        'clock_steps_forward clock_steps_back autopilot_clock_forward autopilot_clock_back'
+    ),
     'process killed and restarted at each state': (
         'landing_killed_searching landing_killed_aiming landing_killed_landing '
         'landing_killed_waiting landing_killed_climbing landing_killed_restarting '

@@ -64,3 +64,26 @@ def test_closing_lets_who_waits_go():
     begun = time.monotonic()
     assert board.take(1, 30.0) is None
     assert time.monotonic() - begun < 10.0
+
+
+MS = 1_000_000
+
+
+def test_after_a_frame_in_vain_it_waits_no_longer_until_a_prompt_is_in_time_again():
+    board = PromptBoard()
+    board.put(prompt(0))
+    waits = []
+    for number in range(1, 7):
+        begun = time.monotonic()
+        assert board.take(100 * MS * number, 0.2) == prompt(0)
+        waits.append(time.monotonic() - begun)
+    assert waits[0] > 0.15
+    assert max(waits[1:]) < 0.1
+    # One that is 3 s late is no sign of a generator that keeps up.
+    board.put(prompt(600 * MS - 3000 * MS))
+    begun = time.monotonic()
+    board.take(700 * MS, 0.2)
+    assert time.monotonic() - begun < 0.1
+    board.put(prompt(600 * MS))
+    threading.Timer(0.05, lambda: board.put(prompt(800 * MS))).start()
+    assert board.take(800 * MS, 10.0) == prompt(800 * MS)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections import deque
 from collections.abc import Callable
 from itertools import accumulate
 from math import hypot, inf
@@ -75,6 +76,22 @@ def test_standing_and_climbing_prove_nothing() -> None:
     watch = ObedienceWatch()
     fly(watch, 10.0, lambda _: 0.0, lambda _, __: 40.0)
     fly(watch, 10.0, lambda _: -2.0, lambda _, __: 40.0, begin_s=20.0)
+    assert watch.problem == ''
+
+
+@pytest.mark.parametrize('pause_s', [0.0, 0.5, 1.0, 1.5, 2.0, 3.0])
+def test_a_climb_that_has_to_end_before_a_descent_is_no_disobedience(pause_s: float) -> None:
+    physics = Physics()
+    physics.down_m = -40.0
+    watch, late = ObedienceWatch(), deque([0.0] * 10)
+    for step in range(round(12.0 / STEP_S)):
+        at_s = step * STEP_S
+        down = -2.0 if at_s < 5.0 else 0.0 if at_s < 5.0 + pause_s else 1.0
+        watch.tell((0.0, 0.0, down))
+        # Of a busy machine both ways are late.
+        late.append(down)
+        physics.step(STEP_S, VelocityCommand(0.0, 0.0, late.popleft()))
+        watch.take((0.0, 0.0, physics.down_m), round(at_s * 1e9))
     assert watch.problem == ''
 
 
