@@ -10,7 +10,9 @@ import socket
 from pathlib import Path
 
 from peace_ros.domain import ConfigurationError
+from peace_ros.resources import config_dir
 
+PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 _DOMAINS = range(60, 101)
 """Above 101 the ports of a domain reach into those that Linux gives away by itself."""
 
@@ -19,7 +21,8 @@ def isolate(log_dir: Path) -> int:
     """Set the ROS environment of this process and its children; return the domain.
 
     Call it before ``rclpy.init``. A domain that the user has set is that of their robots and is
-    left alone.
+    left alone. So is a middleware profile of theirs; without one the shared memory is made large
+    enough for pictures, or a reader that died with one in its hands would stop those of others.
 
     Args:
         log_dir: where ROS keeps its own logs; by default it would be the home directory.
@@ -33,6 +36,7 @@ def isolate(log_dir: Path) -> int:
     os.environ['ROS_LOG_DIR'] = str(log_dir)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ.pop('ROS_STATIC_PEERS', None)
+    os.environ.setdefault(PROFILE, str(config_dir() / 'fastdds.xml'))
     return domain
 
 

@@ -41,8 +41,8 @@ NO_NEW_HEATMAP = Expected(
 
 UNSAFE_HEATMAPS = Expected(
     reaches=LOOKING_AGAIN,
-    within_s=1.5,
-    still_within_s=3.0,
+    within_s=2.0,
+    still_within_s=3.5,
     recovers=GOING,
     recovers_within_s=40.0,
 )

@@ -37,7 +37,7 @@ RANKER_PX = 224
 _HALF_FROM_ELEMENTS = 64
 _BATCH_AND_LENGTH = {0: 'B', 1: 'L'}
 PEOPLE_TILT = 1.5
-"""Added to the logit of people before prompts are read: a missed one costs more than a false one."""
+"""Added to the logit of people before prompts are read: missed ones cost more than false ones."""
 _PEOPLE = slice(Label.PERSON - 1, Label.PERSON)
 
 
