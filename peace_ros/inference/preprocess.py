@@ -50,8 +50,9 @@ class Preprocessor:
                 'let the camera driver scale it down'
             )
         resized = self._resize(image_rgb)
-        for channel, table in enumerate(self._tables):
-            np.take(table, resized[:, :, channel], out=self._buffer[0, channel], mode='clip')
+        planes = cv2.split(np.ascontiguousarray(resized))
+        for plane, table, target in zip(planes, self._tables, self._buffer[0], strict=True):
+            cv2.LUT(plane, table, dst=target)
         return self._buffer
 
     def _resize(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 _DIGITS = 22
 _HALF = 1 << (_DIGITS - 1)
 """Added before the shift: halves are rounded up."""
+_BLOCK = 256
+"""Numbers of a row that are summed at once: what they need of a frame stays in the cache."""
 
 
 def _triangle(x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -65,28 +68,31 @@ def resize(
         height: of the result, pixels.
         interpolation: ``bilinear`` or ``bicubic``, both antialiased.
     """
-    rows = _across(image, width, interpolation)
-    scaled: NDArray[np.uint8] = _across(rows.transpose(1, 0, 2), height, interpolation)
-    upright: NDArray[np.uint8] = scaled.transpose(1, 0, 2)
-    return upright
+    turned = image
+    if image.shape[1] != width:
+        columns = cv2.transpose(np.ascontiguousarray(image))
+        turned = cv2.transpose(_along(columns, width, interpolation))
+    return _along(turned, height, interpolation)
 
 
-def _across(image: NDArray[np.uint8], width: int, interpolation: str) -> NDArray[np.uint8]:
-    if image.shape[1] == width:
+def _along(image: NDArray[np.uint8], rows: int, interpolation: str) -> NDArray[np.uint8]:
+    """Return an image of so many rows."""
+    if image.shape[0] == rows:
         return image
-    taps = _taps(image.shape[1], width, interpolation)
-    length, channels = image.shape[0], image.shape[2]
-    columns = image.transpose(1, 0, 2).reshape(image.shape[1], -1).astype(np.int32)
-    sums = np.full((width, length * channels), _HALF, np.int32)
-    product = np.empty_like(sums)
-    for positions, weights in zip(taps.positions, taps.weights, strict=True):
-        np.take(columns, positions, axis=0, out=product, mode='clip')
-        product *= weights
-        sums += product
-    sums >>= _DIGITS
-    result: NDArray[np.uint8] = np.clip(sums, 0, 255, out=sums).astype(np.uint8)
-    turned: NDArray[np.uint8] = result.reshape(width, length, channels).transpose(1, 0, 2)
-    return turned
+    taps = _taps(image.shape[0], rows, interpolation)
+    flat = image.reshape(image.shape[0], -1)
+    result = np.empty((rows, flat.shape[1]), np.uint8)
+    for start in range(0, flat.shape[1], _BLOCK):
+        part = flat[:, start : start + _BLOCK].astype(np.int32)
+        sums = np.full((rows, part.shape[1]), _HALF, np.int32)
+        product = np.empty_like(sums)
+        for positions, weights in zip(taps.positions, taps.weights, strict=True):
+            np.take(part, positions, axis=0, out=product, mode='clip')
+            product *= weights
+            sums += product
+        sums >>= _DIGITS
+        result[:, start : start + _BLOCK] = np.clip(sums, 0, 255, out=sums)
+    return result.reshape(rows, *image.shape[1:])
 
 
 @lru_cache(maxsize=32)

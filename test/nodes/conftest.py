@@ -74,9 +74,15 @@ class Bench:
         self.until(lambda: publisher.get_subscription_count() > 0)
         return publisher
 
-    def until(self, predicate: Callable[[], bool], doing: Callable[[], None] | None = None) -> None:
+    def until(
+        self,
+        predicate: Callable[[], bool],
+        doing: Callable[[], None] | None = None,
+        *,
+        within_s: float = WAIT_S,
+    ) -> None:
         """Wait for a predicate; ``doing`` is repeated at 20 Hz meanwhile."""
-        deadline = time.monotonic() + WAIT_S
+        deadline = time.monotonic() + within_s
         while not predicate():
             assert time.monotonic() < deadline, 'did not happen in time'
             for node in self._nodes:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -256,6 +257,37 @@ def test_a_poor_precision_is_refused() -> None:
     poor.refuse_if_poor('fp32', 'FastSAM-s')
     with pytest.raises(BundleError, match=r'cosine 0\.99850.*Nothing was written'):
         poor.refuse_if_poor('int8', 'FastSAM-s')
+
+
+@pytest.mark.parametrize(
+    ('precision', 'error', 'refused'),
+    [('fp32', 1e-4, ''), ('fp32', 0.01, '0.001 is allowed'), ('int8', 0.01, ''),
+     ('int8', 0.1, '0.045 is allowed')],
+)  # fmt: skip
+def test_a_batch_may_differ_from_single_images_by_rounding_alone(
+    clip: Bundle,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    precision: str,
+    error: float,
+    refused: str,
+) -> None:
+    from peace_ros.inference.export import fastsam
+
+    class Rounding(Session):
+        def run(self, outputs: Any, feeds: Any) -> Any:
+            (found,) = super().run(outputs, feeds)
+            return [found * (1.0 + error) if len(found) > 1 else found]
+
+    monkeypatch.setattr(fastsam, 'Session', Rounding)
+    given = Bundle(
+        clip.folder, replace(clip.manifest, precision=precision), clip.checksum, clip.paths
+    )
+    if refused:
+        with pytest.raises(BundleError, match=refused):
+            fastsam._write_image_encoder(given, tmp_path / 'image_encoder.onnx')
+    else:
+        fastsam._write_image_encoder(given, tmp_path / 'image_encoder.onnx')
 
 
 def test_the_command_exports_and_says_how_well_it_agrees(

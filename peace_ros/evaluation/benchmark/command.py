@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from peace_ros.domain import ConfigurationError
-from peace_ros.evaluation.benchmark.bundles import NAMES, random_bundles
+from peace_ros.evaluation.benchmark.bundles import NAMES, SEGMENTS, random_bundles
 from peace_ros.evaluation.benchmark.measure import Measured
 from peace_ros.evaluation.benchmark.report import (
     clipseg_figures,
@@ -32,6 +32,8 @@ _REFERENCE = 'peace_ros.evaluation.benchmark.reference:measure_reference'
 _FASTSAM = 'peace_ros.evaluation.benchmark.fastsam:measure_fastsam'
 _FASTSAM_REFERENCE = 'peace_ros.evaluation.benchmark.fastsam_reference:measure_reference'
 _RANDOM = 'random'
+_QUICK_CALLS = 8
+"""Of one CLIP call per segment, those that are made with --quick; all take the same."""
 
 
 def benchmark(
@@ -122,10 +124,8 @@ def benchmark(
     text = markdown(ways, figures, conditions)
     found: dict[str, Any] = {'clipseg': figures, 'conditions': conditions}
     if fastsam:
-        setup = {'fastsam': str(random['fastsam-s-fp32']), 'threads': threads}
-        measured = _measure_fastsam(
-            setup, clip, provider, frames=10 if quick else 20, with_reference=reference
-        )
+        setup = {'fastsam': str(random['fastsam-s-int8']), 'threads': threads}
+        measured = _measure_fastsam(setup, clip, provider, quick=quick, with_reference=reference)
         found['fastsam'] = fastsam_figures(*measured)
         ways = [way for way in measured if way is not None]
         text += '\n' + markdown(ways, found['fastsam'], 'FastSAM-s, 50 segments, 13 terms.')
@@ -152,17 +152,24 @@ def _sweep(clipseg: str, work: Path, threads: int, table: Path, json_file: Path 
 
 
 def _measure_fastsam(
-    setup: dict[str, Any], clip: str, provider: str, *, frames: int, with_reference: bool
+    setup: dict[str, Any], clip: str, provider: str, *, quick: bool, with_reference: bool
 ) -> tuple[Measured, Measured | None, Measured | None]:
     """Return what ours took, the reference, and the reference without texts."""
     typer.echo('timing FastSAM ...')
-    ours = measure_apart(_FASTSAM, **setup, clip=clip, provider=provider, frames=frames)
+    how_long = {'frames': 8, 'parts': 3} if quick else {'frames': 20, 'parts': 5}
+    ours = measure_apart(_FASTSAM, **setup, clip=clip, provider=provider, **how_long)
     if not with_reference:
         return ours, None, None
     typer.echo('timing one CLIP call per segment ...')
     slow, images = (
-        measure_apart(_FASTSAM_REFERENCE, **setup, count=count, with_texts=with_texts)
-        for count, with_texts in ((1, True), (2, False))
+        measure_apart(
+            _FASTSAM_REFERENCE,
+            **setup,
+            count=2,
+            calls=_QUICK_CALLS if quick else SEGMENTS,
+            with_texts=with_texts,
+        )
+        for with_texts in (True, False)
     )
     return ours, slow, images
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from PIL import Image
 from transformers.models.clip.image_processing_pil_clip import CLIPImageProcessorPil
 
@@ -27,7 +28,6 @@ from peace_ros.inference.export.random_models import random_clip
 from peace_ros.inference.tokenizer import Tokenizer
 from peace_ros.segmentation import SegmentationParameters
 from peace_ros.segmentation.fastsam import Letterbox, Segment, assemble, detect
-from peace_ros.segmentation.fastsam.letterbox import Placement
 from peace_ros.segmentation.fastsam.selection import select
 
 _CONTEXT = 77
@@ -49,7 +49,8 @@ class _Reference:
         }
         self._embedded = self._clip.get_text_features(**self._texts).pooler_output
 
-    def find(self, frame: Frame) -> tuple[list[Segment], Placement]:
+    def find(self, frame: Frame) -> tuple[list[Segment], NDArray[np.uint8]]:
+        """Return the segments and the frame at their resolution."""
         parameters = SegmentationParameters()
         pixels, place = self._letterbox(frame.image_rgb)
         predictions, prototypes = self._network(torch.from_numpy(pixels))
@@ -60,35 +61,35 @@ class _Reference:
         )
         cell_px = pixels.shape[-1] // prototypes.shape[-1]
         segments = assemble(found, prototypes[0].numpy(), cell_px, place)
-        return select(segments, place.width_px * place.height_px, parameters).scored, place
+        image = Image.fromarray(frame.image_rgb).resize((place.width_px, place.height_px))
+        frame_px = place.width_px * place.height_px
+        return select(segments, frame_px, parameters).scored, np.asarray(image)
 
     def score(
-        self, frame: Frame, segments: list[Segment], place: Placement, *, with_texts: bool
-    ) -> list[torch.Tensor]:
-        """Return each segment's share of every term."""
-        image = np.asarray(
-            Image.fromarray(frame.image_rgb).resize((place.width_px, place.height_px))
-        )
-        shares = []
-        for segment in segments:
-            crop = image[segment.rows, segment.columns] * segment.mask[:, :, None]
-            pixels = self._processor(Image.fromarray(crop), return_tensors='pt')['pixel_values']
-            if with_texts:
-                logits = self._clip(**self._texts, pixel_values=pixels).logits_per_image
-            else:
-                features = self._clip.get_image_features(pixels).pooler_output
-                logits = 100.0 * torch.nn.functional.cosine_similarity(features, self._embedded)
-            shares.append(logits.flatten().softmax(0))
-        return shares
+        self, image: NDArray[np.uint8], segment: Segment, *, with_texts: bool
+    ) -> torch.Tensor:
+        """Return a segment's share of every term."""
+        crop = image[segment.rows, segment.columns] * segment.mask[:, :, None]
+        pixels = self._processor(Image.fromarray(crop), return_tensors='pt')['pixel_values']
+        if with_texts:
+            logits = self._clip(**self._texts, pixel_values=pixels).logits_per_image
+        else:
+            features = self._clip.get_image_features(pixels).pooler_output
+            logits = 100.0 * torch.nn.functional.cosine_similarity(features, self._embedded)
+        return logits.flatten().softmax(0)
 
 
-def measure_reference(fastsam: str, threads: int, count: int, *, with_texts: bool) -> Measured:
+def measure_reference(
+    fastsam: str, threads: int, count: int, calls: int, *, with_texts: bool
+) -> Measured:
     """Time one CLIP call per segment.
 
     Args:
         fastsam: folder of the bundle with the same random weights, for tokenizer and sizes.
         threads: CPU threads.
         count: frames.
+        calls: how many calls of a frame are made; each segment counts as long as these took on
+            average, so with as many as there are segments, a frame takes what it took.
         with_texts: whether each call encodes the texts too.
     """
     torch.set_num_threads(threads)
@@ -98,18 +99,23 @@ def measure_reference(fastsam: str, threads: int, count: int, *, with_texts: boo
     with torch.inference_mode():
         reference = _Reference(bundle, network, random_clip('ViT-B/32'))
         frames = draw_frames(count)
-        segments, place = reference.find(frames[0])
-        reference.score(frames[0], segments[:_WARM_UP_CALLS], place, with_texts=with_texts)
+        segments, image = reference.find(frames[0])
+        for segment in segments[:_WARM_UP_CALLS]:
+            reference.score(image, segment, with_texts=with_texts)
         for frame in frames:
-            with watch.stage('frame'):
-                with watch.stage('segmenter and masks'):
-                    segments, place = reference.find(frame)
-                with watch.stage('CLIP, call by call'):
-                    reference.score(frame, segments, place, with_texts=with_texts)
+            with watch.stage('segmenter and masks'):
+                segments, image = reference.find(frame)
+            for segment in segments[:calls]:
+                with watch.stage('one CLIP call'):
+                    reference.score(image, segment, with_texts=with_texts)
+            made = min(calls, len(segments))
+            for times in (watch.times_ms, watch.processor_ms):
+                per_call = float(np.mean(times['one CLIP call'][-made:]))
+                times['frame'].append(times['segmenter and masks'][-1] + len(segments) * per_call)
     what = 'image and 13 texts' if with_texts else 'image alone'
     return Measured(
         f'one CLIP call per segment, {what}',
-        'fp32, torch',
+        f'fp32, torch, {made} of {len(segments)} calls timed',
         watch.spreads(),
         count,
         peak_rss_mb(),

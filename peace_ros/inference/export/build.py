@@ -52,17 +52,40 @@ def build_bundle(
     Raises:
         BundleError: it does not agree well enough, or cannot be written. Nothing changes then.
     """
-    if precision not in PRECISIONS:
-        raise BundleError(f'precision {precision!r}: choose one of {", ".join(PRECISIONS)}')
     frames = frames or pictures.draw_pictures(3)
     with staged(folder) as stage:
-        source.vocabulary.write(stage / 'tokenizer.json', source.context_length)
-        _write_graphs(source, stage, precision, frames)
-        _write_manifest(source, stage, folder.name, precision, licence)
+        _fill(stage, source, folder.name, precision, frames, 'checked', licence)
         agreement = compare(source, Bundle.load(stage), frames)
         agreement.refuse_if_poor(precision, source.name)
         _note_agreement(stage / MANIFEST_NAME, agreement)
     return agreement
+
+
+def build_unchecked(
+    source: Source, folder: Path, *, precision: str, frames: Sequence[Frame], licence: str
+) -> None:
+    """Export and put in place, for bundles that are only timed; the manifest says so.
+
+    Takes and raises what :func:`build_bundle` does.
+    """
+    with staged(folder) as stage:
+        _fill(stage, source, folder.name, precision, frames, 'not checked', licence)
+
+
+def _fill(
+    stage: Path,
+    source: Source,
+    name: str,
+    precision: str,
+    frames: Sequence[Frame],
+    done: str,
+    licence: str,
+) -> None:
+    if precision not in PRECISIONS:
+        raise BundleError(f'precision {precision!r}: choose one of {", ".join(PRECISIONS)}')
+    source.vocabulary.write(stage / 'tokenizer.json', source.context_length)
+    _write_graphs(source, stage, precision, frames)
+    _write_manifest(source, stage, name, precision, done, licence)
 
 
 def _write_graphs(source: Source, stage: Path, precision: str, frames: Sequence[Frame]) -> None:
@@ -82,7 +105,9 @@ def _write_graphs(source: Source, stage: Path, precision: str, frames: Sequence[
             to_fp16(file)
 
 
-def _write_manifest(source: Source, stage: Path, name: str, precision: str, licence: str) -> None:
+def _write_manifest(
+    source: Source, stage: Path, name: str, precision: str, done: str, licence: str
+) -> None:
     roles = {
         role: 'tokenizer.json' if role == 'tokenizer' else f'{role}.onnx'
         for role in ROLES_BY_FAMILY[source.family]
@@ -106,7 +131,7 @@ def _write_manifest(source: Source, stage: Path, name: str, precision: str, lice
         'precision': precision,
         'files': {file: file_entry(stage / file) for file in roles.values()},
         'licence': licence,
-        'provenance': f'exported from {source.name} and checked against it',
+        'provenance': f'exported from {source.name} and {done} against it',
         'recommended': _THRESHOLD if source.family == 'clipseg' else {},
     }
     text = json.dumps(manifest, indent=2) + '\n'

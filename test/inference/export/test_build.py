@@ -149,6 +149,14 @@ def test_a_checkpoint_with_missing_weights_is_refused(small_clip: Any, tmp_path:
         load_source(str(tmp_path / 'hub'))
 
 
+def test_a_truncated_checkpoint_is_refused(small_clip: Any, tmp_path: Path) -> None:
+    small_clip.save_pretrained(tmp_path / 'hub')
+    weights = tmp_path / 'hub' / 'model.safetensors'
+    weights.write_bytes(weights.read_bytes()[:-1000])
+    with pytest.raises(BundleError, match=r'its weights cannot be read .*; download them again'):
+        load_source(str(tmp_path / 'hub'))
+
+
 def test_another_family_is_refused(tmp_path: Path) -> None:
     (tmp_path / 'config.json').write_text('{"model_type": "bert"}')
     with pytest.raises(BundleError, match="of the family 'bert'; this exporter takes clip"):

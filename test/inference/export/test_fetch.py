@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import errno
 import functools
 import hashlib
 import http.server
@@ -16,6 +17,8 @@ from typing import Any
 import pytest
 
 from peace_ros.domain import BundleError
+from peace_ros.inference import Bundle
+from peace_ros.inference.export import fetch
 from peace_ros.inference.export.fetch import fetch_bundle
 
 
@@ -143,9 +146,25 @@ def test_an_unknown_name_lists_those_there_are(server: Any, tmp_path: Path) -> N
         fetch_bundle('clip-huge', url_of(server), tmp_path / 'here', no_progress)
 
 
-def test_no_network_is_said(tmp_path: Path) -> None:
+def test_no_network_is_said_and_the_old_bundle_stays(server: Any, tmp_path: Path) -> None:
+    old = fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
     with pytest.raises(BundleError, match=r'cannot be reached .* check the network'):
-        fetch_bundle('clip-tiny', 'http://127.0.0.1:9/index.json', tmp_path / 'x', no_progress)
+        fetch_bundle('clip-tiny', 'http://127.0.0.1:9/index.json', tmp_path / 'here', no_progress)
+    assert Bundle.load(tmp_path / 'here').checksum == old.checksum
+
+
+def test_a_full_disk_is_said_and_the_old_bundle_stays(
+    server: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    monkeypatch.setattr(fetch, '_download', full)
+    with pytest.raises(BundleError, match=r'here: No space left on device; free some space'):
+        fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
+    assert Bundle.load(tmp_path / 'here').checksum == old.checksum
 
 
 def test_an_index_on_disk_will_do(bundle_folder: Path, tmp_path: Path) -> None:
