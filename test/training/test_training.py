@@ -164,3 +164,14 @@ def test_the_learning_rate_rises_then_falls_and_budgets_end() -> None:
     assert rates[0] < rates[1] > rates[2] > rates[3] > 0.0
     assert Budget(10.0, steps=4).progress(4, 0.0) == 1.0
     assert Budget(1.0).progress(99999, 30.0) == 0.5
+
+
+def test_people_weigh_more_than_what_they_hide_and_reach_a_cell_farther() -> None:
+    logits = torch.zeros(1, 9, 5, 5)
+    logits[0, Label.GRASS - 1] = 1.0
+    logits[0, Label.PERSON - 1] = -4.0
+    logits[0, Label.PERSON - 1, 2, 2] = 0.5
+    chosen = export.widen_people(logits).argmax(dim=1)[0] + 1
+    assert (chosen[1:4, 1:4] == Label.PERSON).all()
+    assert (chosen == Label.PERSON).sum() == 9
+    assert (chosen[0] == Label.GRASS).all()
