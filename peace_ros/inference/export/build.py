@@ -43,7 +43,8 @@ def build_bundle(
         folder: the bundle; an older one there stays until the new one has been verified.
         precision: ``fp32``, ``fp16`` or ``int8`` (for CPUs; the text encoder stays fp32, it never
             runs on a frame's path).
-        frames: images to calibrate and verify on; None: drawn ones.
+        frames: images to verify on; None: drawn ones. For int8 most of them are measured to find
+            scales, and it is verified on the others.
         licence: of the weights, as the manifest will say.
 
     Returns:
@@ -52,9 +53,12 @@ def build_bundle(
     Raises:
         BundleError: it does not agree well enough, or cannot be written. Nothing changes then.
     """
+    measured: Sequence[Frame] = ()
+    if precision == 'int8':
+        measured, frames = pictures.divide_pictures(frames)
     frames = frames or pictures.draw_pictures(3)
     with staged(folder) as stage:
-        _fill(stage, source, folder.name, precision, frames, 'checked', licence)
+        _fill(stage, source, folder.name, precision, measured, 'checked', licence)
         agreement = compare(source, Bundle.load(stage), frames)
         agreement.refuse_if_poor(precision, source.name)
         _note_agreement(stage / MANIFEST_NAME, agreement)
@@ -66,7 +70,7 @@ def build_unchecked(
 ) -> None:
     """Export and put in place, for bundles that are only timed; the manifest says so.
 
-    Takes and raises what :func:`build_bundle` does.
+    Takes and raises what :func:`build_bundle` does; all frames are measured.
     """
     with staged(folder) as stage:
         _fill(stage, source, folder.name, precision, frames, 'not checked', licence)

@@ -22,7 +22,7 @@ from peace_ros.inference.bundle import MANIFEST_NAME, Bundle, file_entry
 from peace_ros.inference.contract import IMAGE_EMBEDDING, PIXEL_VALUES, PREDICTIONS, PROTOTYPES
 from peace_ros.inference.export.batching import free_batch
 from peace_ros.inference.export.convolutions import to_int8_convolutions
-from peace_ros.inference.export.pictures import draw_pictures
+from peace_ros.inference.export.pictures import divide_pictures, draw_pictures
 from peace_ros.inference.export.precision import to_fp16
 from peace_ros.inference.export.segmenters import Outputs, SegmenterSource, load_segmenter
 from peace_ros.inference.export.staging import staged
@@ -94,7 +94,8 @@ def export_fastsam(
         folder: where the bundle goes; one that is there stays until the new one is verified.
         side_px: of the input, for a source that is a file.
         precision: of the segmenter: fp32, fp16 (GPU) or int8 (CPU).
-        frames: images to calibrate and verify on; None: drawn ones.
+        frames: images to verify on; None: drawn ones. For int8 most of them are measured to find
+            scales, and it is verified on the others.
 
     Returns:
         How well the segmenter agrees with its reference.
@@ -108,14 +109,17 @@ def export_fastsam(
         raise ConfigurationError(f'precision {precision!r}: choose one of {", ".join(PRECISIONS)}')
     clip.require_family('clip')
     segmenter = load_segmenter(source, side_px) if isinstance(source, Path) else source
-    images = _images(segmenter.side_px, frames)
+    measured: Sequence[Frame] = ()
+    if precision == 'int8':
+        measured, frames = divide_pictures(frames)
+    images = _images(segmenter.side_px, frames or draw_pictures(_CHECKED_BATCH))
     with staged(folder) as stage:
         graph = stage / 'segmenter.onnx'
         segmenter.write(graph)
         if precision == 'fp16':
             to_fp16(graph)
         elif precision == 'int8':
-            to_int8_convolutions(graph, images)
+            to_int8_convolutions(graph, _images(segmenter.side_px, measured))
         _write_image_encoder(clip, stage / 'image_encoder.onnx')
         for role in ('text_encoder', 'tokenizer'):
             path = clip.paths[role]
@@ -149,10 +153,10 @@ def verify_segmenter(
     return worst
 
 
-def _images(side_px: int, frames: Sequence[Frame] | None) -> list[NDArray[np.float32]]:
+def _images(side_px: int, frames: Sequence[Frame]) -> list[NDArray[np.float32]]:
     plain = InputSpec(side_px, side_px, 'stretch', (0.0,) * 3, (1.0,) * 3)
     preprocess = Preprocessor(plain)
-    return [preprocess(each.image_rgb).copy() for each in frames or draw_pictures(_CHECKED_BATCH)]
+    return [preprocess(each.image_rgb).copy() for each in frames]
 
 
 def _compare(have: Outputs, wanted: Outputs, side_px: int) -> SegmenterAgreement:

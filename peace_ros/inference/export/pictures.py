@@ -12,6 +12,7 @@ import numpy as np
 from peace_ros.domain import Frame, ImageError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -30,7 +31,30 @@ TEXTS = (
 IS_POSITIVE = (True, False, False, True, False)
 
 
-def read_pictures(folder: Path, most: int = 8) -> list[Frame]:
+_DRAWN_TO_MEASURE, _DRAWN_TO_CHECK = 12, 3
+_CHECKED_OF = 4
+"""One photo in so many is kept for the check."""
+
+
+def divide_pictures(frames: Sequence[Frame] | None) -> tuple[list[Frame], list[Frame]]:
+    """Return the pictures to measure scales on and others to check them with.
+
+    What lies beyond a measured range is cut off, and each picture has light and colours of its own:
+    drawn ones widen the ranges of few photos, and only pictures that were not measured can tell
+    whether the ranges are wide enough.
+
+    Args:
+        frames: photos; None: all pictures are drawn.
+    """
+    drawn = draw_pictures(_DRAWN_TO_MEASURE + _DRAWN_TO_CHECK)
+    measured, checked = drawn[:_DRAWN_TO_MEASURE], drawn[_DRAWN_TO_MEASURE:]
+    if frames:
+        measured += [each for index, each in enumerate(frames) if index % _CHECKED_OF]
+        checked = list(frames[::_CHECKED_OF])
+    return measured, checked
+
+
+def read_pictures(folder: Path, most: int = 16) -> list[Frame]:
     """Read the first images of a folder in the order of their names; raises ImageError."""
     files = sorted(each for each in folder.glob('*') if each.suffix.lower() in _SUFFIXES)[:most]
     frames = []

@@ -46,21 +46,17 @@ def to_int8(path: Path, scales: Mapping[str, Scale]) -> None:
 
     Args:
         path: of a graph whose nodes are named by the modules they came from.
-        scales: path of the module of a product -> the scale of what enters it; a module with
-            several products of one input has it quantised once.
+        scales: path of the module of a product -> the scale of what enters it. Of several products
+            of one input each has a pair of its own: ONNX Runtime would not fuse a shared one.
     """
     model = onnx.load(str(path))
     graph = model.graph
     constants = {tensor.name: tensor for tensor in graph.initializer}
     nodes: list[NodeProto] = []
-    quantised: set[str] = set()
     for node in graph.node:
         key, _, which = node.name.strip('/').replace('/', '.').rpartition('.MatMul')
         if node.op_type == 'MatMul' and key in scales and node.input[1] in constants:
-            if key not in quantised:
-                nodes += _quantised_input(graph, node.input[0], key, scales[key])
-                quantised.add(key)
-            node.input[0] = f'{key}.input'
+            nodes += _quantised_input(graph, node, key + which, scales[key])
             nodes += _quantised_weights(graph, node, key + which, constants[node.input[1]])
         nodes.append(node)
     del graph.node[:]
@@ -73,19 +69,20 @@ def to_int8(path: Path, scales: Mapping[str, Scale]) -> None:
 
 
 def _quantised_input(
-    graph: GraphProto, name: str, key: str, scale: Scale
+    graph: GraphProto, node: NodeProto, key: str, scale: Scale
 ) -> tuple[NodeProto, NodeProto]:
-    """Return what makes ``{key}.input`` of the array ``name``."""
     kind = np.uint8 if scale.is_unsigned else np.int8
     parts = [
         _constant(graph, f'{key}.input_step', np.array(scale.step, np.float32)),
         _constant(graph, f'{key}.input_zero', np.array(0, kind)),
     ]
     whole, again = f'{key}.input_int8', f'{key}.input'
-    return (
-        helper.make_node('QuantizeLinear', [name, *parts], [whole], f'{key}.quantise'),
+    pair = (
+        helper.make_node('QuantizeLinear', [node.input[0], *parts], [whole], f'{key}.quantise'),
         helper.make_node('DequantizeLinear', [whole, *parts], [again], f'{key}.dequantise'),
     )
+    node.input[0] = again
+    return pair
 
 
 def _quantised_weights(

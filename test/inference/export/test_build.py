@@ -101,6 +101,32 @@ def sources_frames(count: int) -> list[Frame]:
     return build.pictures.draw_pictures(count)
 
 
+@pytest.mark.parametrize('photos', [0, 1, 5])
+def test_int8_is_checked_on_pictures_that_were_not_measured(
+    small_clip: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, photos: int
+) -> None:
+    measured: list[int] = []
+    checked: list[int] = []
+
+    class Watched(build.Quantiser):
+        def __init__(self, source: Any, frames: Any, tokens: Any) -> None:
+            measured.extend(hash(each.image_rgb.tobytes()) for each in frames)
+            super().__init__(source, frames, tokens)
+
+    def compare(source: Any, bundle: Any, frames: Any) -> Any:
+        checked.extend(hash(each.image_rgb.tobytes()) for each in frames)
+        return verify.compare(source, bundle, frames)
+
+    monkeypatch.setattr(build, 'Quantiser', Watched)
+    monkeypatch.setattr(build, 'compare', compare)
+    frames = build.pictures.draw_pictures(photos, seed=9) or None
+    source = from_model('small', 'clip', small_clip)
+    build_bundle(source, tmp_path / 'clip', precision='int8', frames=frames)
+    assert not set(measured) & set(checked)
+    assert len(set(measured)) >= 12
+    assert len(checked) == {0: 3, 1: 1, 5: 2}[photos]
+
+
 def test_a_bundle_that_does_not_agree_leaves_the_old_one(
     small_clip: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -17,6 +17,7 @@ pytest.importorskip('transformers')
 
 import onnx  # noqa: E402
 
+from peace_ros.inference import session  # noqa: E402
 from peace_ros.inference.export import quantiser as quantiser_module  # noqa: E402
 from peace_ros.inference.export.activations import (  # noqa: E402
     best_scale,
@@ -29,6 +30,7 @@ from peace_ros.inference.export.precision import EVERY, MLP  # noqa: E402
 from peace_ros.inference.export.smoothing import smooth  # noqa: E402
 from peace_ros.inference.export.sources import from_model  # noqa: E402
 from peace_ros.inference.export.towers import ClipSegImageTower  # noqa: E402
+from peace_ros.inference.providers import CPU  # noqa: E402
 
 pytestmark = pytest.mark.export
 
@@ -126,6 +128,17 @@ def test_every_product_meant_for_int8_is_in_int8(
     assert _int8_products(folder / 'image_encoder.onnx') == 3 * 6  # query, key and value apart
     assert _int8_products(folder / 'decoder.onnx') == 3 * 2
     assert _int8_products(folder / 'text_encoder.onnx') == 0
+    assert _fused_products(folder / 'image_encoder.onnx', tmp_path) == 3 * 6
+    assert _fused_products(folder / 'decoder.onnx', tmp_path) == 3 * 2
+
+
+def _fused_products(path: Path, folder: Path) -> int:
+    """Return how many products ONNX Runtime really runs in int8, as the nodes open the file."""
+    options = session._options(1, 'all')
+    options.optimized_model_filepath = str(folder / 'optimised.onnx')
+    session._onnxruntime(path, options, [CPU])
+    nodes = onnx.load(str(folder / 'optimised.onnx')).graph.node
+    return sum(node.op_type == 'MatMulIntegerToFloat' for node in nodes)
 
 
 def _int8_products(path: Path) -> int:
