@@ -45,9 +45,9 @@ NO_POSITION = Expected(
 
 JUMPED = Expected(
     reaches=(_HOLD,),
-    within_s=0.8,
-    still_within_s=2.5,
-    zero_within_s=1.0,
+    within_s=1.2,
+    still_within_s=3.0,
+    zero_within_s=1.4,
     allowed=(State.LANDING.value, _HOLD),
     recovers=GOING,
     recovers_within_s=40.0,
