@@ -144,7 +144,7 @@ def test_a_run_with_fastsam_writes_both_objects(
 
     monkeypatch.setattr(command, '_measure', lambda name, **_: ours)
     monkeypatch.setattr(command, 'measure_apart', apart)
-    names = ('clipseg-rd64-fp32', 'clipseg-rd64-int8', 'clip-vit-b-32-int8', 'fastsam-s-int8')
+    names = ('clipseg-rd64-fp32', 'clipseg-rd64-int8', 'clip-vit-b-32-int8', 'fastsam-s-fp32')
     monkeypatch.setattr(command, 'random_bundles', lambda *_: {each: each for each in names})
     app = typer.Typer()
     app.command()(command.benchmark)

@@ -17,11 +17,11 @@ from peace_ros.inference import Bundle
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-NAMES = ('clipseg-rd64-fp32', 'clipseg-rd64-int8', 'clip-vit-b-32-int8', 'fastsam-s-int8')
+NAMES = ('clipseg-rd64-fp32', 'clipseg-rd64-int8', 'clip-vit-b-32-int8', 'fastsam-s-fp32')
 FASTSAM_CLIP = 'clip-vit-b-32-int8'
 SEGMENTS = 50
 """Planted in the segmenter's answers, because random weights find none."""
-_RECIPE = '4'
+_RECIPE = '5'
 """Folder of the bundles; counts on when the export makes them another way."""
 _AT_ONCE = 2
 """Processes that make bundles beside each other: much of it runs on one core."""

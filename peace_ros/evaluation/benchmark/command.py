@@ -124,7 +124,7 @@ def benchmark(
     text = markdown(ways, figures, conditions)
     found: dict[str, Any] = {'clipseg': figures, 'conditions': conditions}
     if fastsam:
-        setup = {'fastsam': str(random['fastsam-s-int8']), 'threads': threads}
+        setup = {'fastsam': str(random['fastsam-s-fp32']), 'threads': threads}
         measured = _measure_fastsam(setup, clip, provider, quick=quick, with_reference=reference)
         found['fastsam'] = fastsam_figures(*measured)
         ways = [way for way in measured if way is not None]
