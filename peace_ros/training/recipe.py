@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, cast
 
 import torch
 
+from peace_ros.inference import Bundle
 from peace_ros.training import ranker, segmenter
 from peace_ros.training.export import export_ranker, export_segmenter, with_weights
 from peace_ros.training.loop import Budget, train
@@ -151,9 +152,15 @@ def _threshold(recipe: Recipe, model: Segmenter) -> float:
 def _provenance(recipe: Recipe, sources: list[Source]) -> str:
     real = sum(source.kind != 'drawn' for source in sources)
     length = f'{recipe.steps} steps' if recipe.steps else f'{recipe.minutes:g} minutes on two cores'
+    if recipe.start is None:
+        begin = (
+            'Trained with peace_ros.training, from EfficientNet-Lite0 weights (Apache-2.0; '
+            'ImageNet) in the segmenter'
+        )
+    else:
+        begin = f'{Bundle.load(recipe.start).manifest.provenance} From there, the segmenter'
     text = (
-        f'Trained with peace_ros.training, from EfficientNet-Lite0 weights (Apache-2.0; ImageNet) '
-        f'in the segmenter (torch {torch.__version__}, seed '
+        f'{begin} (torch {torch.__version__}, seed '
         f'{recipe.seed}, {length}) on {recipe.scenes} scenes drawn by peace_ros'
     )
     if real:

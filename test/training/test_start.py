@@ -14,7 +14,9 @@ torch = pytest.importorskip('torch')
 pytest.importorskip('onnx')
 
 from peace_ros.domain import BundleError, ConfigurationError  # noqa: E402
+from peace_ros.inference import Bundle  # noqa: E402
 from peace_ros.resources import models_dir  # noqa: E402
+from peace_ros.training import recipe  # noqa: E402
 from peace_ros.training.export import export_segmenter  # noqa: E402
 from peace_ros.training.measure import SafetyModel  # noqa: E402
 from peace_ros.training.segmenter import create_segmenter  # noqa: E402
@@ -49,6 +51,23 @@ def test_its_norms_expect_what_they_will_see() -> None:
         learning = model.encoder.train()(_pixels())
     # Other statistics than the stored ones would throw the features far off.
     assert (calm - learning).abs().mean() < 0.25 * calm.abs().mean()
+
+
+def test_the_bundle_says_what_it_went_on_from(tmp_path: Path) -> None:
+    torch.set_num_threads(1)
+    shipped = Bundle.load(_shipped()).manifest.provenance
+    recipe.run(
+        recipe.Recipe(
+            out=tmp_path / 'models', work=tmp_path / 'work', steps=1, scenes=2, seed=3,
+            validation_scenes=1, batch_size=2, view_px=64, scene_px=256, start=_shipped(),
+            with_ranker=False,
+        ),
+        lambda stage, share, line: None,
+    )  # fmt: skip
+    told = Bundle.load(tmp_path / 'models/clipseg-small').manifest.provenance
+    assert told.startswith(f'{shipped} From there, the segmenter (')
+    assert 'seed 3, 1 steps' in told
+    assert not (tmp_path / 'models/clip-small').exists()
 
 
 def test_a_bundle_of_another_kind_or_other_words_is_refused(tmp_path: Path) -> None:
