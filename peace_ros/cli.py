@@ -141,7 +141,7 @@ def demo(
     ] = None,
     timeout: Annotated[
         float, typer.Option(metavar='S', help='Seconds that the landing may take.')
-    ] = 280.0,
+    ] = 330.0,
 ) -> None:
     """Fly a simulated vehicle from 100 m to 20 m over a place that the nodes choose by camera.
 

@@ -12,7 +12,8 @@ from pathlib import Path
 from peace_ros.domain import ConfigurationError, VehicleError
 from peace_ros.recording.run_folder import create_run_folder
 
-DEFAULT_TIMEOUT_S = 280.0
+DEFAULT_TIMEOUT_S = 330.0
+"""Longer than the landing searches (max_search_s), so that "no safe place" can be its answer."""
 _SPEED_LIMITS = (0.1, 10.0)
 _GSD_LIMITS_M = (0.01, 5.0)
 AUTOPILOTS = ('ardupilot', 'px4')
