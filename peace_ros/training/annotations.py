@@ -1,18 +1,29 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Rough polygons drawn by hand over the unlabelled real images, in percent of width and height.
+"""Rough polygons drawn by hand over real images without labels: ``config/annotations/NAME.yaml``.
 
-Later polygons cover earlier ones; what no polygon covers stays unlabeled. Some pixels are known
-only in part (a block of yards, a gravel lot): they carry one of the partial classes below.
+A file tells where the picture of that name comes from and under which licence, its scale, and
+lines of ``class x,y x,y ...`` in percent of width and height; ``+`` continues a line. Later
+polygons cover earlier ones; what no polygon covers stays unlabeled. Some pixels are known only in
+part (a block of yards, a gravel lot): they carry one of the partial classes below.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+import yaml
 
-from peace_ros.domain import Label
+from peace_ros.domain import ConfigurationError, Label
+from peace_ros.resources import config_dir
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
 
 VEGETATION = 10
 """Grass or tree: the datasets that do not part them."""
@@ -48,260 +59,63 @@ _NAMES = {
     'unsafe': NOT_SAFE,
 }
 
-ANNOTATIONS: dict[str, str] = {
-    'brighton_beach_park': """
-tree 0,0 15,0 15,10 20,17 20,57 17,62 18,85 13,92 13,100 0,100
-paved 22,20 26,20 27,40 26,58 22,60
-paved 41,38 46,35 58,37 70,38 78,33 82,33 80,40 76,45 74,42 68,40.5 58,41.5 52,48 51.5,56 54,62
-+ 58,66 64,67 65,68 62,74 59,75 55,70 50,68.5 44,68.5 40,65 42,62 46,55 46.5,48 43,42
-paved 27.5,40 31,37 28.5,45 28.5,55 30,60 27,62 26,60
-grass 30,46 34,40 38,38 43,43 46,48 45,54 40,61 36,62 31,58 29.5,52
-tree 29.5,44 33,41.5 37,44 34,49 30,49
-tree 35,50 36.5,48.3 38.2,50 36.5,52
-tree 40.5,48 42,46.5 43.7,48 42,49.5
-tree 37.5,55 39,53.3 40.6,55 39,56.7
-tree 34,57.5 36,55.5 37.5,57.5 36,59.5
-grass 53,49 57,43 63,40.5 70,40.5 74,44 73.5,51 70,60 65,65.5 59,66 54,61 52,55
-- 65,48 70,41 74.5,43 73.5,52 70,57 65,52
-tree 61,58 64,53 68,55 70,60 66,65 62,63
-tree 55,53 57,51 59,53 57,54.5
-tree 59.5,47 61.5,44.5 63,47 61,48.5
-tree 70,43.5 72,42.5 73,45 71,46.5
-grass 27,80 35,79 40,73 45,69.5 50,70.5 54,75 55,82 55,100 26,100
-- 46,70 55,74 55.5,88 53,85 51,80
-tree 47,92 51,88 55,87 57,93 55,98 49,98
-tree 18,66 22,63 28,67 34,70 40,72 38,78 36,82 30,79 24,76 20,70
-tree 41.5,75 43,73.5 44.5,75 43,76.5
-tree 45.5,75 47,73.5 48.7,75 47,76.8
-tree 47.8,77.5 49.3,76 50.8,77.5 49.3,79
-tree 29.5,82 31,80.5 33,82 31,84
-tree 33,83.5 34.5,82 36,83.5 34.5,85
-tree 39.5,86 41,84.5 42.5,86 41,87.5
-tree 38.5,91 40,89.5 41.5,91 40,92.5
-- 30,92 36,92 43,96 42,99 30,95
-grass 21,1 40,1 41.5,4 44,5 44,20 38,20 34,18 33,12 28,12 21,13
-grass 40,28 45,26 49,28 50,32 46,34 41,31
-tree 35,22 40,21 41,27 36,28
-tree 45,20 55,19 57,27 52,29 46,24
-building 41.6,0 44.4,0 44.4,4 41.6,4
-paved 45,0 51,0 54,2 50,7 47,12 45,18 44.5,18 44.5,5
-vehicle 53,3.5 55.5,1.5 56.5,2.5 54,5
-tree 52,12 57,6 64,10 68,15 66,22 58,22 52,25 50,18
-tree 74,5 78,2 84,1 88,3 87,12 85,18 78,18 74,12
-tree 68,22 75,18 80,22 80,28 74,32 68,30
-grass 65,1 73,0 73,4 68,8 65,6
-obstacle 64,6 66,4.5 66.7,6.2 65,7.3
-obstacle 72.4,6 74.2,4.2 74.8,5.5 73,7
-grass 58,30 62,28 66,30 65,33 60,33.5
-paved 83,17 89,14 89,20 88,28 87,38 83,44 80,42 82,34 80,29 82,24
-vehicle 83,41 88,39.5 88.2,41.5 83.5,43.2
-vehicle 83,45.5 87,44.5 87.3,46.8 83.3,48.2
-vehicle 82,50.3 86.5,49.5 86.8,51.5 82.5,52.2
-tree 89,12 91,15 94,30 95,38 90,40 88.5,32 89,22
-bare 96,3 100,5 100,60 98,58 96,45 97,30 95,15
-tree 73,70 70,62 75,56 84,52 92,55 97,62 98,85 90,92 85,90 78,85 72,79 66,72
-loose 61,80 68,76 71,79 70,82 68,87 72,92 72,95 62,94
-vehicle 70,82 72,80.5 75.5,82.5 74,84
-vehicle 69,84.5 74,86 74.3,88 69.5,87.5
-vehicle 72.8,89 78,88.3 78.5,91 73,91.8
-paved 56,80 60,82 61,92 60,100 56,100
-paved 57,79 60,76 66,75 63,80 60,82
-building 61,98 62,94 65,92.5 68,94 69.5,98 69,100 62,100
-unsafe 88,96 93,90 100,84 100,100 86,100
-paved 18,77 25,77 25.5,100 14,100 18,88
-""",
-    'boruszyn_4909': """
-grass 31,8 34,1 42,0 53,9 44,19 37,28 35,22
-grass 38,32 52,14 63,8 60.5,25 60,50 60,79 53,84 50,70 46,53 42,43
-open 20,27 30,12 36,30 42,50 46,63 47,80 39,87 36,72 32,58 27,45
-bare 65,20 74,21 75,35 75,67 69,84 63,83 61.8,60 62.2,30
-bare 66,11 72,0 77,2 93,14 90,27 76,20 66,18
-paved 64.3,0 66,0 64.5,10 62.2,22 61.3,40 62.3,100 61.8,100 60.9,60 60.5,40 61,24 63,12
-water 46,92 52,88 58,85 59,100 45.5,100
-grass 0,5 8,4 15,16 8,22 2,18
-building 3,41 8,41 13,50 21,59 21.5,64 17,70 0,53 0,44
-building 0,69 6,62 12,69 0,86
-building 5.5,81 11,73.5 28,92 21,98
-building 0,87 15,100 0,100
-building 3,15 8,10.5 9,14 5,18.5
-obstacle 19,66 23,62 27,65 22,71
-paved 18,75 22,70.5 25,72 27,82 22,80
-tree 10,25 16,24 20,32 19,35 12,32
-tree 18,35 23,38 27,46 24,50 18,44
-tree 42,43 46,53 48,66 50,80 47.5,80 46,65 43,55
-tree 42,82 44,79 46.5,84 45,88 41.5,88
-tree 40,94 44,93 44,100 40,100
-grass 24,71 31,60 35,72 37,85 32,89 28,80
-grass 8,33 12,36 17,45 12,44
-bare 8,0 25,0 20,10 18,14 13,10
-building 63.5,85 67,84 68,89 64,90
-building 74.5,87 76,87 76,96 73.5,97
-grass 93,64 98,40 99,65 97,75 92,75
-""",
-    'boruszyn_4918': """
-grass 0,26 14,20 24,22 28,31 28,33 14,42 4,46 0,40
-grass 2,12 18,1 22,10 20,13 2,22
-grass 20,66 35,58 41,68 43,76 38,78 34,85 28,91 20,90 16,80
-grass 54,81 62,71 66,76 67,82 60,90 55,90
-grass 88,68 95,60 95,52 100,50 100,78 92,77 88,71
-grass 32,12 44,8 52,6 57,12 45,18 36,24 32,20
-grass 0,58 8,60 14,64 14,80 8,85 5,80 0,78
-loose 28,18 31,15 40,9 50,2 54,2 44,8 33,15 30,20 32,31 36,40 41,45 36,49 33,43 30,33
-loose 14,63 19,62 17,68 14.5,78 16,87 20,92 23,97 20,97 14,90 13,78
-paved 43,50 54,43 58,47 61,58 55,63 50,69 48,70 45,62
-paved 36,50 41,49 44,58 46,68 41,63 38,57
-building 6.5,48 28.5,34 33,47.5 13,61
-building 0,0 3,0 6.5,9 1,11 0,11
-building 34.5,26.5 42.5,21.5 45,26 53,20 62,15.5 64,25 47,37 41.5,41 38,32
-building 61.5,10.5 68,7.5 72,21 65,26
-building 60,33 67.5,29.5 74.5,62 67,67
-building 70,32 93,15.5 95.5,21.5 72,44
-building 74,52 95.5,34 97.3,43.5 77,61.5
-building 49.5,74 57,70.5 58,75 52,80
-building 45,84 48.5,80 50,85 46.5,88
-building 84,84 85.5,80.5 90,80.5 88.5,86
-building 13,93 15,92 18,98 16.5,99
-obstacle 68,5 71,3 74,7 75,14 70,15
-obstacle 56,66 59,63.5 61.5,67 60,75 57,75.5
-obstacle 35,81 38,79 40,82 39.5,86 35,90 33,88
-obstacle 70,71 73,70 75,77 71,79.5
-obstacle 40,92 46,88 49,92 46,99 40,99.5
-tree 74,66 80,62 86,63 88,70 86,77 78,78 74,73
-tree 76,83 82,80 84,86 84,92 78,90
-tree 90,82 96,78 100,82 100,100 90,98
-tree 0,82 5,80 9,92 2,97 0,95
-tree 51,16 58,13 60,15 52,21
-tree 26,2 34,0 37,6 28,10
-water 63,97 68,95 70,100 63,100
-""",
-    'boruszyn_4883': """
-grass 0,0 26,0 20,12 18,20 14,33 10,47 0,47
-open 32,4 37,2 45,9 42,17 33,30 28,60 27,70 6,72 8,62 15,45 22,25 28,12
-tree 27,6 31,5 28,12 20,26 16,38 14,42 15,33 20,20
-grass 36,30 43,20 45,11 50,11 50,18 47,30 44,38 37,37
-grass 0,50 9,50 9,55 4,65 0,68
-bare 0,86 7,84 20,80 22.5,80 21,100 1,100
-grass 23,81 35.5,81 35.5,99 23,99
-building 28,86 33,86 33,90 28,90
-building 44.5,78 50,78 50,93 44.5,93
-building 53.5,22.5 59,22.5 59,48.5 53.5,48.5
-building 62.5,25 67,25 67,49 62,49
-building 52,50 68,50.5 68,58 52,58
-building 44.5,45 50.5,45 50,72 43.5,73 45.5,60
-building 70,93 79,92 79,99 70.5,99
-building 86,56 91,52 93,54 88,59
-building 95,23 99,20.5 100,24 96,26
-building 66.5,8 70,1 73,0 77,0 76,4 70,9
-paved 53,60.5 60,60.5 62,65 62,72 53,72.5
-paved 48,22 52,20 51,30 53,40 47,38 49,30
-paved 81,0 83.5,0 92,14 95,19 93.5,24 90.5,17 84,6
-grass 78,10 82,8 88,15 90,22 85,30 82,38 74,41 70.5,38 70,25 75,17
-grass 52.5,80 57,77 64,77 64,81 61,86 63,90 58,94 53,88
-grass 66,61 72,61 72,69 66.5,70
-tree 32,53 36,50 39.5,53 39,58 34,60 31,60
-tree 83,36 90,30 96,33 99,45 96,52 88,52 84,46
-tree 93,60 100,58 100,92 90,88 88,78
-tree 28,68 34,67 36,74 32,78 29,75
-tree 55,10 62,9 61,18 55,18
-tree 63,11 67,10 69,16 65,20
-water 76,66 78,60 83,60 84,68 82,75 78,74
-obstacle 74,74 76,73 82,84 81,86 78,84
-obstacle 62,62.5 66.5,62.5 66.5,66.5 62,66.5
-obstacle 61.5,81 64,80 65,84 62,84.5
-loose 36,61 38,60 38,70 41,75 52,75 70,71 73,62 74.5,62 73,73 55,77 40,76.5 36.5,71
-""",
-    'boruszyn_4955': """
-grass 46,40 52,33 60,31 70,33 82,40 92,52 99,54 98,65 93,80 86,93 80,88 72,78 64,70 57,60 50,53
-+ 46,50
-obstacle 53,43.5 55.5,40 56.3,40.5 54,45.5
-obstacle 67,73.5 70,75 69.5,76 67,74.5
-obstacle 90.5,79 92.5,75 93.2,75.3 91,80.3
-vehicle 72.8,38 73.5,37 74.8,38.3 74,39.5
-person 73,50 73.8,50 73.8,52 73,52
-vehicle 46,52 47,51.5 48.7,54.3 47.8,55
-building 29.5,9.5 59.5,5 60.5,17 30,20
-building 18.5,0 27,0 28,13 20,17
-building 36,57 39.5,52 47.5,57.5 43,61
-building 23,87 28,83 37.5,97 33,100 30,100
-building 8,91.5 12,88 16,94 11.5,98
-building 23.5,73 27,69.5 28.5,73.5 25,76
-building 83.5,21 86,15 98,22 97,27 84,24
-building 92,34 98,20 100,21 100,37
-building 70,15 71.5,9.5 74,10 71.8,18
-building 2.5,18 4.5,17.5 9.5,22 9,24.5 3,24
-building 28,1 42,0 48,0 30,3
-paved 73,16 75,10 80,9 86,13 83,20 85,24 88,32 80,29 72,25
-vehicle 72.3,28 73,25.5 74,26 73.3,28.3
-vehicle 74,28.5 74.8,25.7 75.5,26 74.8,29
-vehicle 75.4,29 76,26.3 77,26.5 76.2,29.5
-vehicle 82,32 82.5,29.8 83.5,30 84,31.5 83,33.5
-paved 32,26 60,20 61,23 56,27 33,29.5
-paved 3,0 18,0 18,14 10,17 4,16
-grass 4.5,27 10,25 18,25 19,33 18,42 8,43 5,38
-tree 20,14 27,13 32,20 32,27 27,30 20,26
-tree 25,46 30,43 33,47 32,54 27,56
-tree 40,68 50,58 58,63 64,72 64,80 57,88 45,86 40,78
-tree 31,63 37,62 40,70 37,77 31,73
-tree 50,88 60,85 68,90 74,98 50,100
-tree 39,33 46,30 45,42 39,45
-tree 71,88 74,85 79,92 78,97 72,97
-tree 88,4 95,8 98,13 90,11 85,7
-water 2,66 6,59 12,56 17,60 18,70 16,76 8,77 4,72
-obstacle 10.5,16 15,15 14.5,25 10.3,25.5
-obstacle 23,32 26.5,30 29,37 27,41.5 24,38
-obstacle 0,48 3,50 1.5,55 0,56
-paved 100,70 100,80 88,100 84,100 92,89
-loose 0,43 20,42 21,46 0,47
-""",
-    'caliterra_9368': """
-bare 20,0 45,0 52,20 46,28 40,33 26,30 22,20 10,5
-bare 45,35 55,40 62,60 75,65 70,68 50,62 30,55 12,52 30,47 40,50
-grass 60,33 70,35 80,45 82,60 72,60 66,52 60,40
-grass 0,30 6,30 18,50 10,50 2,45
-bare 0,63 8,70 25,82 40,92 50,100 35,100 15,85 0,73
-bare 70,85 100,75 100,100 60,100
-bare 70,5 80,5 100,20 90,19 78,14
-obstacle 2,12 5,8 12,16 25,33 26,36 22,38 15,30
-obstacle 14,20 17,16 24.5,28 22,31.5
-obstacle 11.3,15 14,12 15,13 12.5,17
-obstacle 24,37 27,36 35,42 33,46 27,42
-obstacle 33,36 34.5,34 36,36 34.3,38
-obstacle 37.5,35 39,33 41,35 39.5,37
-obstacle 41.5,40 43,38.5 44.7,40 42.5,42.3
-obstacle 40.8,46.5 42.2,44.5 43.6,46.2 42,48.2
-obstacle 44,51.5 45.5,49.5 47,51.5 45.3,53.5
-obstacle 49,50 50.5,48 52.3,49.5 51,52
-obstacle 42,65 44.5,65 44.5,68.5 42,68.5
-obstacle 60,77 62,77 62,80 60,80
-obstacle 62.8,78 65,78 65,80.5 62.8,80.5
-obstacle 21.3,39.5 24.3,40 24.3,43 21.3,42.5
-obstacle 18.3,47 20.5,47 20.5,49.7 18.3,49.7
-obstacle 24.2,46.5 26.4,46.5 26.4,49 24.2,49
-""",
-    'caliterra_9413': """
-bare 0,72 20,68 35,58 45,50 52,20 60,5 66,0 90,0 85,10 72,25 70,42 66,55 55,68 40,85 30,95 20,100
-+ 0,100
-bare 0,10 8,28 10,45 12,60 0,66
-bare 12,5 40,0 42,25 30,38 25,48 15,35
-grass 70,40 75,25 85,15 97,20 88,48 80,68 70,95 48,100 38,100 50,80 62,62
-tree 92,50 100,35 100,72 92,78 85,68
-vehicle 71.5,89 73.5,79.5 76,79.8 75.8,84 74,90
-obstacle 15,16 18,16 18,20 15,19.5
-obstacle 11.5,39.5 13,39 14.5,45 13,45.5
-obstacle 0.3,44 1.5,43.5 4,52 3,53
-obstacle 87,12 91,0 92,0 88,12.5
-obstacle 89,16 92,0 96,0 92.5,18
-""",
-}
-"""Image name without suffix -> lines of ``class x,y x,y ...``; ``+`` continues a line."""
+
+@dataclass(frozen=True)
+class Annotation:
+    """What is known about one real image."""
+
+    name: str
+    """Of the image file, without suffix."""
+    origin: str
+    licence: str
+    gsd_m: float
+    """Metres per pixel at nadir, estimated; it only sizes what training pastes in."""
+    frame_px: tuple[float, float]
+    """Smallest and largest side of a view cut from it."""
+    polygons: tuple[tuple[int, NDArray[np.float64]], ...]
+    """Pixel class and corners (float64 [N, 2], percent of width and height), in drawing order."""
 
 
-def rasterise(name: str, width_px: int, height_px: int) -> NDArray[np.uint8]:
+def load_annotations() -> list[Annotation]:
+    """Read every annotation that ships with the package, by name.
+
+    Raises:
+        ConfigurationError: a file says something else than the form above.
+    """
+    return [_load(path) for path in sorted((config_dir() / 'annotations').glob('*.yaml'))]
+
+
+def _load(path: Path) -> Annotation:
+    try:
+        content: dict[str, Any] = yaml.safe_load(path.read_text(encoding='utf-8'))
+        low, high = content['frame_px']
+        lines = content['polygons'].replace('\n+', '').splitlines()
+        return Annotation(
+            path.stem,
+            content['origin'],
+            content['licence'],
+            float(content['gsd_m']),
+            (float(low), float(high)),
+            tuple(_polygon(line) for line in lines),
+        )
+    except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+        raise ConfigurationError(
+            f'{path}: not an annotation ({error!r}); see its neighbours'
+        ) from error
+
+
+def _polygon(line: str) -> tuple[int, NDArray[np.float64]]:
+    kind, *points = line.split()
+    corners = np.array([[float(part) for part in point.split(',')] for point in points])
+    if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2:
+        raise ValueError(f'{line!r}: at least three corners x,y are needed')
+    return _NAMES[kind], corners
+
+
+def rasterise(annotation: Annotation, width_px: int, height_px: int) -> NDArray[np.uint8]:
     """Return the pixel classes of an annotated image, uint8 height x width."""
     classes = np.zeros((height_px, width_px), dtype=np.uint8)
-    for line in ANNOTATIONS[name].replace('\n+', '').strip().splitlines():
-        kind, *points = line.split()
-        corners = np.array([[float(part) for part in point.split(',')] for point in points])
+    for kind, corners in annotation.polygons:
         scaled = np.round(corners * (width_px, height_px) / 100.0).astype(np.int32)
-        cv2.fillPoly(classes, [scaled], int(_NAMES[kind]))
+        cv2.fillPoly(classes, [scaled], kind)
     return classes

@@ -164,10 +164,6 @@ def _provenance(recipe: Recipe, sources: list[Source]) -> str:
         f'{recipe.seed}, {length}) on {recipe.scenes} scenes drawn by peace_ros'
     )
     if real:
-        text += (
-            f' and {real} real images: Semantic segmentation of aerial imagery (CC0, Humans in '
-            'the Loop with MBRSC), odm_data_caliterra (CC0, Dennis Baldwin), '
-            'drone_dataset_brighton_beach (BSD-2-Clause, Piero Toffanin), odm_boruszyn_kap '
-            '(CC-BY 3.0, Andrew Zaborowski / OpenStreetMap-PL)'
-        )
+        origins = sorted({source.origin for source in sources if source.origin})
+        text += f' and {real} real images: {", ".join(origins)}'
     return text + '.'

@@ -15,7 +15,7 @@ import numpy as np
 
 from peace_ros.domain import Label, WorldError
 from peace_ros.simulation.drawing import draw_scene
-from peace_ros.training.annotations import ANNOTATIONS, VEGETATION, rasterise
+from peace_ros.training.annotations import VEGETATION, load_annotations, rasterise
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -48,6 +48,8 @@ class Source:
     frame_side_px: tuple[float, float]
     """Smallest and largest side of a frame, in pixels of the largest size."""
     season: str = ''
+    origin: str = ''
+    """Publisher and licence of a real image."""
 
 
 def build_source(
@@ -58,6 +60,7 @@ def build_source(
     gsd_m: float,
     frame_side_px: tuple[float, float],
     season: str = '',
+    origin: str = '',
 ) -> Source:
     """Halve image and classes as often as the largest frame needs."""
     images, rasters = [image_rgb], [classes]
@@ -67,7 +70,10 @@ def build_source(
         raster = cv2.resize(rasters[-1], (width, height), interpolation=cv2.INTER_NEAREST)
         images.append(np.asarray(half, dtype=np.uint8))
         rasters.append(np.asarray(raster, dtype=np.uint8))
-    return Source(name, kind, tuple(images), tuple(rasters), gsd_m, frame_side_px, season)
+    return Source(name, kind, tuple(images), tuple(rasters), gsd_m, frame_side_px, season, origin)
+
+
+_DUBAI = 'Semantic segmentation of aerial imagery, Humans in the Loop with MBRSC (CC0-1.0)'
 
 
 def _read(path: Path, flag: int) -> NDArray[np.uint8]:
@@ -93,31 +99,43 @@ def load_dubai(folder: Path, split: str) -> list[Source]:
         image = _read(folder / row['image'], cv2.IMREAD_COLOR)
         side = float(min(image.shape[:2]))
         sources.append(
-            build_source(row['image'], 'satellite', image, classes, 0.35, (90.0, 1.1 * side))
+            build_source(
+                row['image'],
+                'satellite',
+                image,
+                classes,
+                0.35,
+                (90.0, 1.1 * side),
+                origin=_DUBAI,
+            )
         )
     return sources
 
 
-_DRONE_IMAGES: dict[str, tuple[float, float, float]] = {
-    'brighton_beach_park': (0.035, 180.0, 2200.0),
-    'boruszyn_4909': (0.10, 250.0, 2400.0),
-    'boruszyn_4918': (0.045, 300.0, 2400.0),
-    'boruszyn_4883': (0.065, 250.0, 2400.0),
-    'boruszyn_4955': (0.045, 300.0, 2400.0),
-    'caliterra_9368': (0.015, 500.0, 2400.0),
-    'caliterra_9413': (0.015, 500.0, 2400.0),
-}
-"""Name -> estimated ground sampling distance in metres, smallest and largest frame side in px."""
-
-
 def load_drone(folder: Path) -> list[Source]:
-    """Load the drone and kite images whose licence allows derived weights, with our polygons."""
+    """Load the annotated photographs that lie in ``ortho`` of the folder, with our polygons.
+
+    All are under licences that allow derived weights. Those that are not there are left out: they
+    come from many places, and a run tells in its provenance which ones it had.
+    """
     sources = []
-    for name in ANNOTATIONS:
-        image = _read(folder / 'ortho' / f'{name}.jpg', cv2.IMREAD_COLOR)
-        classes = rasterise(name, image.shape[1], image.shape[0])
-        gsd_m, low, high = _DRONE_IMAGES[name]
-        sources.append(build_source(name, 'drone', image, classes, gsd_m, (low, high)))
+    for annotation in load_annotations():
+        path = folder / 'ortho' / f'{annotation.name}.jpg'
+        if not path.is_file():
+            continue
+        image = _read(path, cv2.IMREAD_COLOR)
+        classes = rasterise(annotation, image.shape[1], image.shape[0])
+        sources.append(
+            build_source(
+                annotation.name,
+                'drone',
+                image,
+                classes,
+                annotation.gsd_m,
+                annotation.frame_px,
+                origin=f'{annotation.origin} ({annotation.licence})',
+            )
+        )
     return sources
 
 

@@ -7,15 +7,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 torch = pytest.importorskip('torch')
 pytest.importorskip('onnx')
 
-from peace_ros.domain import Label  # noqa: E402
+from peace_ros.domain import ConfigurationError, Label  # noqa: E402
 from peace_ros.inference import Bundle, Session, open_sessions  # noqa: E402
-from peace_ros.training import annotations, batches, export, losses, recipe  # noqa: E402
+from peace_ros.training import annotations, batches, export, losses, recipe, sources  # noqa: E402
 from peace_ros.training.loop import Budget, learning_rate  # noqa: E402
 from peace_ros.training.ranker import create_ranker  # noqa: E402
 from peace_ros.training.segmenter import create_segmenter  # noqa: E402
@@ -153,8 +154,10 @@ def test_calling_a_hazard_safe_costs_more_than_missing_safe_ground() -> None:
 
 
 def test_every_annotated_image_has_open_ground_and_hazards() -> None:
-    for name in annotations.ANNOTATIONS:
-        kinds = set(np.unique(annotations.rasterise(name, 320, 240)).tolist())
+    known = annotations.load_annotations()
+    assert known
+    for annotation in known:
+        kinds = set(np.unique(annotations.rasterise(annotation, 320, 240)).tolist())
         assert kinds & {Label.GRASS, Label.BARE_GROUND}
         assert kinds & {Label.BUILDING, Label.TREE, Label.VEHICLE, Label.OBSTACLE}
 
@@ -175,3 +178,31 @@ def test_people_weigh_more_than_what_they_hide_and_reach_a_cell_farther() -> Non
     assert (chosen[1:4, 1:4] == Label.PERSON).all()
     assert (chosen == Label.PERSON).sum() == 9
     assert (chosen[0] == Label.GRASS).all()
+
+
+def test_only_annotated_photographs_that_are_there_are_trained_on(tmp_path: Path) -> None:
+    folder = tmp_path / 'ortho'
+    folder.mkdir()
+    picture = np.full((600, 800, 3), 90, np.uint8)
+    for name in ('caliterra_9413', 'of_nobody'):
+        cv2.imwrite(str(folder / f'{name}.jpg'), picture)
+    (source,) = sources.load_drone(tmp_path)
+    assert source.name == 'caliterra_9413'
+    assert source.origin == 'odm_data_caliterra, Dennis Baldwin (CC0-1.0)'
+    assert set(np.unique(source.classes[0])) > {Label.GRASS, Label.BARE_GROUND}
+
+
+def test_an_annotation_that_cannot_be_read_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / 'annotations'
+    folder.mkdir()
+    monkeypatch.setattr(annotations, 'config_dir', lambda: tmp_path)
+    good = 'origin: a\nlicence: CC0-1.0\ngsd_m: 0.1\nframe_px: [200, 400]\npolygons: |\n  '
+    (folder / 'place.yaml').write_text(good + 'grass 0,0 9,0 9,9\n')
+    (read,) = annotations.load_annotations()
+    assert annotations.rasterise(read, 100, 100)[2, 5] == Label.GRASS
+    for polygon in ('grass 0,0 9,0', 'moss 0,0 9,0 9,9', 'grass 0,0 9,zero 9,9'):
+        (folder / 'place.yaml').write_text(good + polygon + '\n')
+        with pytest.raises(ConfigurationError, match=r'place\.yaml: not an annotation'):
+            annotations.load_annotations()
