@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rough polygons drawn by hand over real images without labels: ``config/annotations/NAME.yaml``.
 
-A file tells where the picture of that name comes from and under which licence, its scale, and
-lines of ``class x,y x,y ...`` in percent of width and height; ``+`` continues a line. Later
-polygons cover earlier ones; what no polygon covers stays unlabeled. Some pixels are known only in
-part (a block of yards, a gravel lot): they carry one of the partial classes below.
+A file tells where the picture of that name comes from and under which licence, its scale, whether
+it is kept for validation (``split: val``), and lines of ``class x,y x,y ...`` in percent of width
+and height; ``+`` continues a line. Later polygons cover earlier ones; what no polygon covers stays
+unlabeled. Some pixels are known only in part (a block of yards, a gravel lot): they carry one of
+the partial classes below.
 """
 
 from __future__ import annotations
@@ -72,6 +73,8 @@ class Annotation:
     """Metres per pixel at nadir, estimated; it only sizes what training pastes in."""
     frame_px: tuple[float, float]
     """Smallest and largest side of a view cut from it."""
+    is_validation: bool
+    """Its place is kept out of training."""
     polygons: tuple[tuple[int, NDArray[np.float64]], ...]
     """Pixel class and corners (float64 [N, 2], percent of width and height), in drawing order."""
 
@@ -96,6 +99,7 @@ def _load(path: Path) -> Annotation:
             content['licence'],
             float(content['gsd_m']),
             (float(low), float(high)),
+            content.get('split') == 'val',
             tuple(_polygon(line) for line in lines),
         )
     except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:

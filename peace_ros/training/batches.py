@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
@@ -78,6 +78,13 @@ class Batch:
     views: tuple[View, ...]
 
 
+def _chances(sources: list[Source]) -> NDArray[np.float64]:
+    """Return how often each source is taken; many pictures of one place count less each."""
+    count = Counter(source.origin for source in sources)
+    chances = np.array([count[source.origin] ** -0.5 for source in sources])
+    return chances / chances.sum()
+
+
 class BatchMaker:
     """Makes batch n from the seed and n alone, so that a resumed run sees what it would have."""
 
@@ -90,6 +97,7 @@ class BatchMaker:
         total = sum(share for share, _ in kept)
         self._shares = [share / total for share, _ in kept]
         self._sources = [sources for _, sources in kept]
+        self._chances = [_chances(sources) for sources in self._sources]
         self._seed, self._batch_size = seed, batch_size
         self._view_px, self._prompts = view_px, prompts
         self._condition_chance = condition_chance
@@ -104,8 +112,10 @@ class BatchMaker:
         texts: list[str] = []
         wanted = np.zeros((self._batch_size, self._prompts, LABEL_COUNT), dtype=np.float32)
         for index in range(self._batch_size):
-            sources = self._sources[int(rng.choice(len(self._sources), p=self._shares))]
-            source = sources[int(rng.integers(len(sources)))]
+            group = int(rng.choice(len(self._sources), p=self._shares))
+            source = self._sources[group][
+                int(rng.choice(self._chances[group].size, p=self._chances[group]))
+            ]
             view = sample_view(
                 source,
                 rng,

@@ -115,13 +115,14 @@ def load_dubai(folder: Path, split: str) -> list[Source]:
 def load_drone(folder: Path) -> list[Source]:
     """Load the annotated photographs that lie in ``ortho`` of the folder, with our polygons.
 
-    All are under licences that allow derived weights. Those that are not there are left out: they
-    come from many places, and a run tells in its provenance which ones it had.
+    Those kept for validation are left out. All are under licences that allow derived weights.
+    What is not there is left out too: the pictures come from many places, and a run tells in its
+    provenance which ones it had.
     """
     sources = []
     for annotation in load_annotations():
         path = folder / 'ortho' / f'{annotation.name}.jpg'
-        if not path.is_file():
+        if annotation.is_validation or not path.is_file():
             continue
         image = _read(path, cv2.IMREAD_COLOR)
         classes = rasterise(annotation, image.shape[1], image.shape[0])
