@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Is a reported position to be believed? Jumps are not, as long as we fly by it; pure."""
+"""Is a reported position to be believed? Jumps are not, until they have proved lasting; pure."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ GAP_S = 1.0
 """Reports farther apart are compared by the fastest speed only."""
 SETTLED_S = 2.0
 """Reports that agree with each other for so long are believed again, when somebody else flies."""
+RESET_S = 15.0
+"""The same while we fly and stand still, when the height has stayed as it was."""
+SAME_HEIGHT_M = 2.0
 
 
 @dataclass(frozen=True)
@@ -29,9 +32,12 @@ class Report:
 class JumpWatch:
     """Compares each position with where the one before it led.
 
-    A jump is an EKF reset or a fault; whichever it is, map and altitude no longer mean what they
-    meant. While we have control it is not believed until the position comes back to where it was;
-    while somebody else flies, as soon as the new one has been steady for two seconds.
+    A jump is a reset of the position filter or a fault; whichever it is, the map no longer means
+    what it meant. While we have control the vehicle stands until the position comes back to where
+    it was, or has been steady at the old height for fifteen seconds: GNSS that returns moves the
+    position for good, and whoever lost his radio could help a vehicle that waits for ever least of
+    all. A height that jumped stays unbelieved, since everything that sinks relies on it. While
+    somebody else flies two steady seconds are enough.
 
     Args:
         limit_m: Deviation that is still believed.
@@ -60,8 +66,7 @@ class JumpWatch:
         if self.problem:
             # The vehicle has been told to stand still since: it must be where it was.
             back = dist(report.position_m, self._believed.position_m) <= self._limit_m
-            settled_ms = report.boot_ms - self._steady_since_ms
-            if back or (not in_control and settled_ms >= SETTLED_S * 1e3):
+            if back or self._has_settled(report, in_control=in_control):
                 return self._believe(report)
             return False
         excess_m = self._deviation_m(self._believed, report)
@@ -70,9 +75,17 @@ class JumpWatch:
         jump_m = dist(report.position_m, self._believed.position_m)
         self.problem = (
             f'the reported position jumped by {jump_m:.1f} m, which no flight explains (limit '
-            f'{self._limit_m:g} m): it is not believed; take over, engage again when it is right'
+            f'{self._limit_m:g} m): holding until it comes back, or has been steady at the same '
+            f'height for {RESET_S:g} s'
         )
         return False
+
+    def _has_settled(self, report: Report, *, in_control: bool) -> bool:
+        settled_s = (report.boot_ms - self._steady_since_ms) / 1e3
+        if not in_control or self._believed is None:
+            return settled_s >= SETTLED_S
+        rose_m = abs(report.position_m[2] - self._believed.position_m[2])
+        return settled_s >= RESET_S and rose_m <= SAME_HEIGHT_M
 
     def _believe(self, report: Report) -> bool:
         self._believed, self.problem = report, ''
