@@ -142,6 +142,46 @@ def test_a_bundle_that_does_not_agree_leaves_the_old_one(
     assert [each.name for each in tmp_path.iterdir()] == ['clip']
 
 
+def test_masks_that_differ_are_refused_though_scores_agree() -> None:
+    verify.Agreement(0.1, 0.9999, 0.99, median_iou=0.985, mask_iou=0.9).refuse_if_poor('int8', '-')
+    poor = verify.Agreement(0.1, 0.9999, 0.99, median_iou=0.975, mask_iou=0.99)
+    with pytest.raises(BundleError, match=r'of masks at the median 0\.9750; .* both IoUs of 0\.98'):
+        poor.refuse_if_poor('int8', 'CLIPSeg')
+
+
+def test_masks_are_cut_at_the_median_of_all_pictures() -> None:
+    rng = np.random.default_rng(5)
+    varied = rng.uniform(0.0, 0.4, (40, 40))
+    meadow = np.full((40, 40), 0.9)
+
+    def noisy(scores: Any) -> Any:
+        return scores + rng.normal(0.0, 1e-3, scores.shape)
+
+    def judged(*pairs: tuple[Any, Any]) -> verify.Agreement:
+        return verify.agreement_of([verify.Answers(0.1, 0.9999, *pair) for pair in pairs])
+
+    # Scores that stay below one half, yet lie elsewhere than they should.
+    assert judged((np.roll(varied, 1), varied)).median_iou < 0.5
+    assert judged((np.roll(varied, 1), varied)).mask_iou == 1.0
+    # One that looks the same everywhere: noise, not an error of the bundle.
+    judged((noisy(varied), varied), (noisy(meadow), meadow)).refuse_if_poor('int8', 'CLIPSeg')
+
+
+def test_a_clipseg_is_judged_by_the_masks_of_its_pictures(
+    make_small_clipseg: Callable[..., Any], tmp_path: Path
+) -> None:
+    source = from_model('small', 'clipseg', make_small_clipseg())
+    build_bundle(source, tmp_path / 'small')
+    frames = sources_frames(2)
+    right = verify.compare(source, Bundle.load(tmp_path / 'small'), frames)
+    assert right.median_iou > 0.99
+    other = from_model('other', 'clipseg', make_small_clipseg(reduce_dim=64))
+    wrong = verify.compare(other, Bundle.load(tmp_path / 'small'), frames)
+    assert wrong.median_iou < 0.9
+    figures = Bundle.load(tmp_path / 'small').manifest.verification
+    assert {'iou', 'median_iou', 'mask_iou'} <= {*figures}
+
+
 def test_a_full_disk_leaves_the_old_one(
     small_clip: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
