@@ -84,6 +84,58 @@ def test_a_damaged_file_is_refused(tmp_path: Path) -> None:
         load_openclip(path)
 
 
+@pytest.mark.parametrize('content', [torch.zeros(2), [1, 2], {'state_dict': None}, {'epoch': 3}])
+def test_a_file_of_something_else_is_refused(tmp_path: Path, content: Any) -> None:
+    torch.save(content, tmp_path / 'model.pt')
+    with pytest.raises(BundleError, match=r'holds something else than the weights .*; give a CLIP'):
+        load_openclip(tmp_path / 'model.pt')
+
+
+def test_a_file_that_would_run_code_is_refused_without_advice_to_let_it(tmp_path: Path) -> None:
+    torch.save({'network': Path()}, tmp_path / 'model.pt')
+    with pytest.raises(BundleError, match='cut short or more than weights') as refused:
+        load_openclip(tmp_path / 'model.pt')
+    assert 'weights_only' not in str(refused.value)
+
+
+def test_weights_of_a_folder_without_the_folder_are_refused(
+    small_clip: Any, tmp_path: Path
+) -> None:
+    small_clip.save_pretrained(tmp_path)
+    with pytest.raises(BundleError, match='give the folder that holds it'):
+        load_openclip(tmp_path / 'model.safetensors')
+
+
+@pytest.mark.parametrize('gone', ['text_projection', 'ln_final.weight', 'resblocks', 'c_fc.bias'])
+def test_missing_weights_are_refused(small_clip: Any, tmp_path: Path, gone: str) -> None:
+    state = {key: each for key, each in as_openclip(small_clip).items() if gone not in key}
+    torch.save(state, tmp_path / 'model.pt')
+    with pytest.raises(BundleError, match=r'(no weight|weights are missing) .*; give a CLIP'):
+        load_openclip(tmp_path / 'model.pt')
+
+
+def test_weights_of_another_shape_are_refused(small_clip: Any, tmp_path: Path) -> None:
+    state = as_openclip(small_clip)
+    state['visual.positional_embedding'] = state['visual.positional_embedding'][:-1]
+    torch.save(state, tmp_path / 'model.pt')
+    with pytest.raises(BundleError, match=r'other shapes .*position_embedding.*; give a CLIP'):
+        load_openclip(tmp_path / 'model.pt')
+
+
+@pytest.mark.parametrize(
+    ('config', 'told'),
+    [
+        ('{"model_cfg": ', r'open_clip_config\.json: cannot be read .*; download it again'),
+        ('[]', r'open_clip_config\.json: cannot be read .*; download it again'),
+        ('{"model_cfg": {}}', r'no weights in it; download open_clip_model\.safetensors'),
+    ],
+)
+def test_a_folder_that_is_not_whole_is_refused(tmp_path: Path, config: str, told: str) -> None:
+    (tmp_path / 'open_clip_config.json').write_text(config)
+    with pytest.raises(BundleError, match=told):
+        load_openclip(tmp_path)
+
+
 def test_a_convolutional_clip_is_refused(small_clip: Any, tmp_path: Path) -> None:
     state = as_openclip(small_clip) | {'visual.layer1.0.conv1.weight': torch.zeros(1)}
     torch.save(state, tmp_path / 'rn50.pt')
