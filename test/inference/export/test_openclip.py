@@ -56,6 +56,41 @@ def as_openclip(model: Any) -> dict[str, Any]:
     return {name: tensor.clone() for name, tensor in state.items()}
 
 
+class Part(torch.nn.Module):
+    """Holds weights, as the parts of OpenAI's archives do."""
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return x
+
+
+def write_archive(state: dict[str, Any], path: Path) -> None:
+    """Write weights as OpenAI does: a TorchScript archive, in fp16, that knows its sizes."""
+    archive = Part()
+    for name, tensor in state.items():
+        part = archive
+        *parts, last = name.split('.')
+        for each in parts:
+            if each not in dict(part.named_children()):
+                part.add_module(each, Part())
+            part = part.get_submodule(each)
+        part.register_parameter(last, torch.nn.Parameter(tensor.half(), requires_grad=False))
+    for name, size in (('input_resolution', 64), ('context_length', 77), ('vocab_size', 49408)):
+        archive.register_buffer(name, torch.tensor(size))
+    torch.jit.save(torch.jit.script(archive), str(path))
+
+
+def test_an_archive_of_openai_is_the_same_network(small_clip: Any, tmp_path: Path) -> None:
+    path = tmp_path / 'ViT-B-32.pt'
+    write_archive(as_openclip(small_clip), path)
+    assert is_openclip(path)
+    model = load_openclip(path)
+    assert model.config.vision_config.hidden_act == 'quick_gelu'
+    assert model.config.text_config.hidden_act == 'quick_gelu'
+    for name, tensor in small_clip.state_dict().items():
+        if tensor.is_floating_point():
+            torch.testing.assert_close(model.state_dict()[name], tensor.half().float())
+
+
 @pytest.mark.parametrize('form', ['file', 'safetensors', 'folder'])
 def test_the_network_is_the_same(small_clip: Any, tmp_path: Path, form: str) -> None:
     state = as_openclip(small_clip)
