@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import dist
+from math import dist, hypot
 
 Vector = tuple[float, float, float]
 SLACK_M_S = 3.0
@@ -48,12 +48,14 @@ class JumpWatch:
         self._believed: Report | None = None
         self._newest: Report | None = None
         self._steady_since_ms = 0
+        self._height_jumped_m = 0.0
         self.problem = ''
         """Why the position is not believed, empty when it is."""
 
     def forget(self) -> None:
         """Believe whatever comes next."""
         self._believed = self._newest = None
+        self._height_jumped_m = 0.0
         self.problem = ''
 
     def believes(self, report: Report, *, in_control: bool) -> bool:
@@ -61,6 +63,7 @@ class JumpWatch:
         newest, self._newest = self._newest, report
         if newest is None or self._deviation_m(newest, report) > 0.0:
             self._steady_since_ms = report.boot_ms
+            self._height_jumped_m += 0.0 if newest is None else _off_course(newest, report)[2]
         if self._believed is None:
             return self._believe(report)
         if self.problem:
@@ -81,26 +84,36 @@ class JumpWatch:
         return False
 
     def _has_settled(self, report: Report, *, in_control: bool) -> bool:
+        """Tell whether it has been steady for long enough; sinking to a stop is no jump."""
         settled_s = (report.boot_ms - self._steady_since_ms) / 1e3
-        if not in_control or self._believed is None:
+        if not in_control:
             return settled_s >= SETTLED_S
-        rose_m = abs(report.position_m[2] - self._believed.position_m[2])
-        return settled_s >= RESET_S and rose_m <= SAME_HEIGHT_M
+        return settled_s >= RESET_S and abs(self._height_jumped_m) <= SAME_HEIGHT_M
 
     def _believe(self, report: Report) -> bool:
-        self._believed, self.problem = report, ''
+        self._believed, self._height_jumped_m, self.problem = report, 0.0, ''
         return True
 
     def _deviation_m(self, before: Report, after: Report) -> float:
         """Return by how much a step exceeds what is allowed; 0 or less when it does not."""
         dt_s = (after.boot_ms - before.boot_ms) / 1e3
-        if not 0.0 <= dt_s <= GAP_S:
-            moved_m = dist(after.position_m, before.position_m)
-            return moved_m - self._limit_m - FASTEST_M_S * abs(dt_s)
-        expected = tuple(
-            p + dt_s * (v + w) / 2.0
-            for p, v, w in zip(
-                before.position_m, before.velocity_m_s, after.velocity_m_s, strict=True
-            )
+        allowed_m_s = SLACK_M_S if 0.0 <= dt_s <= GAP_S else FASTEST_M_S
+        return hypot(*_off_course(before, after)) - self._limit_m - allowed_m_s * abs(dt_s)
+
+
+def _off_course(before: Report, after: Report) -> Vector:
+    """Return how far a report lies from where the one before it led; over a gap, from its place."""
+    dt_s = (after.boot_ms - before.boot_ms) / 1e3
+    if not 0.0 <= dt_s <= GAP_S:
+        dt_s = 0.0
+    north, east, down = (
+        q - p - dt_s * (v + w) / 2.0
+        for p, q, v, w in zip(
+            before.position_m,
+            after.position_m,
+            before.velocity_m_s,
+            after.velocity_m_s,
+            strict=True,
         )
-        return dist(after.position_m, expected) - self._limit_m - SLACK_M_S * dt_s
+    )
+    return north, east, down

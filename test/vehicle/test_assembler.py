@@ -230,6 +230,16 @@ def test_a_position_that_stays_where_it_jumped_to_is_believed_in_the_end(assembl
     assert assembler.position_problem(0) == ''
 
 
+def test_sinking_to_a_stop_after_a_jump_is_no_jump_of_the_height(assembler):
+    assembler.take(position(1000, vz=2.0), 0, 0)
+    assembler.take(attitude(1000), 0, 0)
+    assembler.take(heartbeat(4), 0, 0)
+    for i in range(45):
+        sunk_m = 2.0 * (0.1 + i / 30)
+        assembler.take(position(1100 + 33 * i, x=21.0, z=-30.0 + sunk_m, vz=2.0), 0, 0)
+    assert jump(assembler, count=600, begin_ms=2600, z=-27.0) == pytest.approx(15.0, abs=2.0)
+
+
 def test_a_height_that_jumped_is_never_believed_while_we_fly(assembler):
     assembler.take(position(1000), 0, 0)
     assembler.take(attitude(1000), 0, 0)
