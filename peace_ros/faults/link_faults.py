@@ -161,6 +161,14 @@ TELEMETRY = (
         'A position that no flight explains is not believed until it comes back: HOLD.',
     ),
     Fault(
+        'position_resets',
+        'telemetry',
+        'The reported position jumps by 20 m to the north and stays there, as when GNSS returns.',
+        Autopilot('position', {'north_m': 20.0}, undo=''),
+        JUMPED,
+        'HOLD, until it has been steady at the same height for 15 s; then searches with a new map.',
+    ),
+    Fault(
         'frame_enu',
         'telemetry',
         'LOCAL_POSITION_NED comes in ENU.',

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The timed sender with the dead-man: no set-point outlives its age.
 
-Fresh set-point -> it is sent. Before it is ``limit_s`` old -> zero velocity. Older than
-``limit_s`` plus ``handover_s`` -> the autopilot is asked, once, for its own hold mode. Not in
-control -> silence.
+Fresh set-point -> it is sent; the first that stops the vehicle at once, the others in turn.
+Before it is ``limit_s`` old -> zero velocity. Older than ``limit_s`` plus ``handover_s`` -> the
+autopilot is asked, once, for its own hold mode. Not in control -> silence.
 """
 
 from __future__ import annotations
@@ -81,6 +81,7 @@ class SetpointSender:
         self._steady_ns = steady_ns
         self._lock = threading.Lock()
         self._stop = threading.Event()
+        self._wake = threading.Event()
         self._newest: Setpoint | None = None
         self._submitted_ns = 0
         self._state = SenderState.IDLE
@@ -101,7 +102,7 @@ class SetpointSender:
             self._thread.start()
 
     def submit(self, setpoint: Setpoint) -> None:
-        """Replace the set-point that is being sent.
+        """Replace the set-point that is being sent; one that stops the vehicle leaves at once.
 
         Raises:
             VehicleError: A component is not finite; the set-point before it goes on ageing.
@@ -110,7 +111,11 @@ class SetpointSender:
         if not all(isfinite(each) for each in v):
             raise VehicleError(f'velocity set-point {v} m/s: all components must be finite')
         with self._lock:
+            # Whoever kills this process a moment later must not leave the vehicle sinking.
+            stops = setpoint.is_zero and self._newest is not None and not self._newest.is_zero
             self._newest, self._submitted_ns = setpoint, self._steady_ns()
+        if stops:
+            self._wake.set()
 
     def resume(self) -> None:
         """Begin anew after a hand-over or a takeover; nothing is sent until the next submit."""
@@ -124,6 +129,7 @@ class SetpointSender:
         """Send nothing any more, from now on; final."""
         with self._lock:
             self._stop.set()
+            self._wake.set()
             self._newest = None
             self._state = SenderState.STOPPED
         if self._thread is not None and self._thread is not threading.current_thread():
@@ -213,6 +219,8 @@ class SetpointSender:
     def _run(self) -> None:
         due = time.monotonic()
         while not self._stop.is_set():
+            self._wake.clear()
             self.tick()
             due = max(due + self._period_s, time.monotonic())
-            self._stop.wait(due - time.monotonic())
+            if self._wake.wait(due - time.monotonic()):
+                due = time.monotonic()

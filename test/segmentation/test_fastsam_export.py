@@ -88,6 +88,13 @@ def export(checkpoint: Path, clip: Bundle, folder: Path, **options: Any) -> Bund
     return Bundle.load(folder)
 
 
+def test_a_missing_checkpoint_is_said_before_anything_is_installed_for_it(
+    clip: Bundle, tmp_path: Path
+) -> None:
+    with pytest.raises(BundleError, match='no such file'):
+        export(tmp_path / 'FastSAM-s.pt', clip, tmp_path / 'out')
+
+
 def test_the_bundle_runs_and_says_its_licence(
     network: Any, checkpoint: Path, clip: Bundle, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -21,8 +21,8 @@ def assembler():
     return Assembler(ArduPilot(), VehicleParameters())
 
 
-def position(boot_ms=1000, *, x=1.0, vx=0.0, vz=0.0):
-    return mavlink.MAVLink_local_position_ned_message(boot_ms, x, 2.0, -30.0, vx, 0.0, vz)
+def position(boot_ms=1000, *, x=1.0, z=-30.0, vx=0.0, vz=0.0):
+    return mavlink.MAVLink_local_position_ned_message(boot_ms, x, 2.0, z, vx, 0.0, vz)
 
 
 def attitude(boot_ms=1000, roll=0.0, pitch=0.0, yaw=0.0):
@@ -194,12 +194,13 @@ def test_what_comes_twice_or_late_is_dropped(assembler):
     assert assembler.telemetry(0).pose.north_m == 5.0
 
 
-def jump(assembler, count=150, mode=4, begin_ms=1100):
+def jump(assembler, count=150, mode=4, begin_ms=1100, **to):
     """Report a place 20 m away for a while; return when it is believed."""
-    assembler.take(heartbeat(mode), 0, 0)
     for i in range(count):
         boot_ms = begin_ms + 33 * i
-        assembler.take(position(boot_ms, x=21.0), 0, i * SECOND // 30)
+        if i % 30 == 0:
+            assembler.take(heartbeat(mode), 0, i * SECOND // 30)
+        assembler.take(position(boot_ms, **({'x': 21.0} | to)), 0, i * SECOND // 30)
         assembler.take(attitude(boot_ms), 0, i * SECOND // 30)
         if assembler.telemetry(i * SECOND // 30).pose is not None:
             return i / 30
@@ -219,6 +220,39 @@ def test_a_jump_is_not_believed_while_we_fly(assembler):
     assembler.take(position(9000), 0, 5 * SECOND)
     assembler.take(attitude(9000), 0, 5 * SECOND)
     assert assembler.telemetry(5 * SECOND).pose is not None, 'back where it was'
+
+
+def test_a_position_that_stays_where_it_jumped_to_is_believed_in_the_end(assembler):
+    """GNSS came back: nobody else could tell the vehicle to go on."""
+    assembler.take(position(1000), 0, 0)
+    assembler.take(attitude(1000), 0, 0)
+    assert jump(assembler, count=600) == pytest.approx(15.0, abs=0.2)
+    assert assembler.position_problem(0) == ''
+
+
+def test_sinking_to_a_stop_after_a_jump_is_no_jump_of_the_height(assembler):
+    assembler.take(position(1000, vz=2.0), 0, 0)
+    assembler.take(attitude(1000), 0, 0)
+    assembler.take(heartbeat(4), 0, 0)
+    for i in range(45):
+        sunk_m = 2.0 * (0.1 + i / 30)
+        assembler.take(position(1100 + 33 * i, x=21.0, z=-30.0 + sunk_m, vz=2.0), 0, 0)
+    assert jump(assembler, count=600, begin_ms=2600, z=-27.0) == pytest.approx(15.0, abs=2.0)
+
+
+def test_a_height_that_jumped_is_never_believed_while_we_fly(assembler):
+    assembler.take(position(1000), 0, 0)
+    assembler.take(attitude(1000), 0, 0)
+    assert jump(assembler, count=900, z=-33.0) is None
+    assert 'the same height' in assembler.position_problem(0)
+
+
+def test_a_position_that_goes_on_jumping_is_not_believed(assembler):
+    assembler.take(position(1000), 0, 0)
+    assembler.take(attitude(1000), 0, 0)
+    for start in range(3):
+        begin_ms = 1100 + 10_000 * start
+        assert jump(assembler, count=300, begin_ms=begin_ms, x=21.0 + 20.0 * start) is None
 
 
 def test_a_jump_is_believed_after_two_seconds_when_a_person_flies(assembler):

@@ -217,3 +217,20 @@ def test_its_own_thread_keeps_the_rate():
     time.sleep(0.2)
     assert len(link.sent) == count
     assert sender.statistics().max_gap_s < 0.5
+
+
+def test_a_stop_leaves_at_once_and_zeros_after_it_keep_the_rate():
+    link = RecordingLink()
+    sender = SetpointSender(link, limit_s=3.0, parameters=SenderParameters(rate_hz=4.0))
+    sender.start()
+    sender.submit(FORWARD)
+    time.sleep(0.85)  # a turn has just been, the next is 0.15 s away
+    sender.submit(Setpoint(stamp_ns=8))
+    time.sleep(0.05)
+    stopped, count = link.sent[-1].is_zero, len(link.sent)
+    for _ in range(20):
+        sender.submit(Setpoint(stamp_ns=9))
+        time.sleep(0.005)
+    sender.stop()
+    assert stopped
+    assert len(link.sent) <= count + 1

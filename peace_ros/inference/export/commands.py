@@ -13,6 +13,7 @@ from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TimeRemai
 
 from peace_ros.domain import ConfigurationError
 from peace_ros.inference.bundle import user_models_dir
+from peace_ros.inference.manifest import PRECISIONS
 
 _INDEX = 'PEACE_MODELS_INDEX'
 _NEEDED = ('torch', 'transformers', 'onnx')
@@ -46,6 +47,10 @@ def export(
     ] = 0,
 ) -> None:
     """Export CLIP, CLIPSeg or FastSAM, verify it against its reference, put it in place."""
+    if precision not in PRECISIONS:  # before gigabytes are loaded
+        raise ConfigurationError(f'precision {precision!r}: choose one of {", ".join(PRECISIONS)}')
+    if name and Path(name).name != name:
+        raise ConfigurationError(f'--name {name}: give a name; --out says in which folder it goes')
     if clip:
         _export_fastsam(Path(source), clip, out, name, precision, images, side)
         return

@@ -44,7 +44,7 @@ def fetch_bundle(name: str, index: str, folder: Path, progress: Progress) -> Bun
         BundleError: no network, no such bundle, a file that differs from its checksum, no room.
             What was downloaded so far is kept beside the folder, and the next call goes on there.
     """
-    where = index if urlsplit(index).scheme in _SCHEMES else Path(index).absolute().as_uri()
+    where = index if '://' in index else Path(index).expanduser().absolute().as_uri()
     entry = _entry(name, where)
     base = urljoin(where, str(entry['url']).rstrip('/') + '/')
     folder = folder.expanduser().absolute()
@@ -90,12 +90,17 @@ def _open(url: str, start: int = 0) -> Any:
     try:
         return urllib.request.urlopen(request, timeout=_TIMEOUT_S)  # noqa: S310
     except urllib.error.HTTPError as error:
-        raise BundleError(f'{url}: the server says {error.code} {error.reason}') from error
-    except (urllib.error.URLError, *_BROKEN) as error:
         raise BundleError(
-            f'{url}: cannot be reached ({error}); check the network and call again, what has come '
-            'is kept'
+            f'{url}: the server says {error.code} {error.reason}; check --index or ask who keeps it'
         ) from error
+    except (urllib.error.URLError, *_BROKEN) as error:
+        remedy = (
+            'check the path'
+            if urlsplit(url).scheme == 'file'
+            else 'check the network and call again, what has come is kept'
+        )
+        reason = getattr(error, 'reason', error)
+        raise BundleError(f'{url}: cannot be reached ({reason}); {remedy}') from error
 
 
 def _read(url: str) -> bytes:

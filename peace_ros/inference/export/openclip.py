@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import torch
 from safetensors.torch import load_file
+from torch import Tensor
 from transformers import CLIPConfig, CLIPModel
 
 from peace_ros.domain import BundleError
@@ -18,15 +19,13 @@ from peace_ros.domain import BundleError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from torch import Tensor
-
 _CONFIG = 'open_clip_config.json'
 _WEIGHTS = (
     'open_clip_model.safetensors',
     'open_clip_pytorch_model.safetensors',
     'open_clip_pytorch_model.bin',
 )
-_SUFFIXES = ('.pt', '.pth', '.bin', '.safetensors')
+SUFFIXES = ('.pt', '.pth', '.bin', '.safetensors')
 _HEAD_WIDTH = 64
 """Of every vision and text tower that OpenAI and OpenCLIP call ViT-B or ViT-L."""
 
@@ -48,6 +47,7 @@ _LAYER_NAMES = {
     'mlp.c_fc': 'mlp.fc1',
     'mlp.c_proj': 'mlp.fc2',
 }
+_HUGGING_FACE = ('text_model.', 'vision_model.', 'clip.', 'visual_projection', 'logit_bias')
 _LAYER = re.compile(r'(visual\.)?transformer\.resblocks\.(\d+)\.(.+)')
 
 
@@ -55,17 +55,12 @@ def is_openclip(path: Path) -> bool:
     """Tell whether a path looks like such a checkpoint."""
     if path.is_dir():
         return (path / _CONFIG).is_file() and not (path / 'config.json').is_file()
-    return path.suffix in _SUFFIXES
+    return path.suffix in SUFFIXES
 
 
 def load_openclip(path: Path) -> CLIPModel:
     """Load a checkpoint file, or a folder with open_clip_config.json; raises BundleError."""
-    quick = None
-    file = path
-    if path.is_dir():
-        config = json.loads((path / _CONFIG).read_text(encoding='utf-8'))
-        quick = bool(config.get('model_cfg', config).get('quick_gelu', False))
-        file = next((path / name for name in _WEIGHTS if (path / name).is_file()), path)
+    quick, file = _look_into(path) if path.is_dir() else (None, path)
     state, is_openai = _read(file)
     weights = _translate(state, path)
     gelu = 'quick_gelu' if (is_openai if quick is None else quick) else 'gelu'
@@ -73,9 +68,10 @@ def load_openclip(path: Path) -> CLIPModel:
     try:
         report = model.load_state_dict(weights, strict=False)
     except RuntimeError as error:
+        example = str(error).splitlines()[-1].strip().rstrip('.')
         raise BundleError(
-            f'{path}: weights of other shapes than a CLIP has ({str(error).splitlines()[-1]}); '
-            'give a CLIP checkpoint with a vision transformer'
+            f'{path}: weights of other shapes than a CLIP has ({example}); give a CLIP checkpoint '
+            'with a vision transformer'
         ) from error
     missing = [key for key in report.missing_keys if not key.endswith('position_ids')]
     if missing or report.unexpected_keys:
@@ -85,6 +81,23 @@ def load_openclip(path: Path) -> CLIPModel:
             'checkpoint with a vision transformer'
         )
     return model.eval()
+
+
+def _look_into(folder: Path) -> tuple[bool, Path]:
+    """Return whether the network uses the quick GELU, and the file of its weights."""
+    config = folder / _CONFIG
+    try:
+        values = json.loads(config.read_text(encoding='utf-8'))
+        quick = bool(values.get('model_cfg', values).get('quick_gelu', False))
+    except (OSError, ValueError, AttributeError) as error:
+        raise BundleError(f'{config}: cannot be read ({error}); download it again') from error
+    file = next((folder / name for name in _WEIGHTS if (folder / name).is_file()), None)
+    if file is None:
+        raise BundleError(
+            f'{folder}: {_CONFIG}, but no weights in it; download {", ".join(_WEIGHTS[:-1])} or '
+            f'{_WEIGHTS[-1]} too'
+        )
+    return quick, file
 
 
 def _read(file: Path) -> tuple[Mapping[str, Tensor], bool]:
@@ -98,10 +111,18 @@ def _read(file: Path) -> tuple[Mapping[str, Tensor], bool]:
         except RuntimeError:
             state = torch.load(str(file), map_location='cpu', weights_only=True)
     except Exception as error:  # pickle, zip and safetensors have no common base
+        # What torch says goes on for lines, and tells people to let the file run code.
         raise BundleError(
-            f'{file}: not a readable checkpoint ({str(error).splitlines()[0]}); download it again'
+            f'{file}: not a readable checkpoint ({file.stat().st_size} bytes, cut short or more '
+            'than weights); download it again, or give a CLIP checkpoint'
         ) from error
-    state = state.get('state_dict', state)
+    if isinstance(state, dict):
+        state = state.get('state_dict', state)
+    if not isinstance(state, dict) or not all(isinstance(each, Tensor) for each in state.values()):
+        raise BundleError(
+            f'{file}: holds something else than the weights of one network; give a CLIP '
+            'checkpoint, or save the state_dict of its model alone'
+        )
     return {key.removeprefix('module.'): value for key, value in state.items()}, False
 
 
@@ -122,6 +143,11 @@ def _translate(state: Mapping[str, Tensor], path: Path) -> dict[str, Tensor]:
         else:
             stem, _, last = key.rpartition('.')
             name = _NAMES.get(key) or (f'{_NAMES[stem]}.{last}' if stem in _NAMES else None)
+            if name is None and key.startswith(_HUGGING_FACE):
+                raise BundleError(
+                    f'{path}: its weights have the names of save_pretrained; give the folder that '
+                    'holds it and its config.json'
+                )
             if name is None:
                 raise BundleError(
                     f'{path}: weight {key!r} is of no CLIP with a vision transformer; give '
@@ -150,6 +176,10 @@ def _config(weights: Mapping[str, Tensor], path: Path, activation: str) -> CLIPC
         words = weights['text_model.embeddings.token_embedding.weight']
         text_positions = weights['text_model.embeddings.position_embedding.weight']
         projection_dim = weights['text_projection.weight'].shape[0]
+        widths = {
+            side: len(weights[f'{side}.encoder.layers.0.mlp.fc1.bias'])
+            for side in ('vision_model', 'text_model')
+        }
     except KeyError as error:
         raise BundleError(
             f'{path}: no weight {error}; give a CLIP checkpoint with a vision transformer'
@@ -160,7 +190,7 @@ def _config(weights: Mapping[str, Tensor], path: Path, activation: str) -> CLIPC
     def tower(side: str, width: int) -> dict[str, Any]:
         return {
             'hidden_size': width,
-            'intermediate_size': len(weights[f'{side}.encoder.layers.0.mlp.fc1.bias']),
+            'intermediate_size': widths[side],
             'num_attention_heads': width // _HEAD_WIDTH,
             'num_hidden_layers': 1 + max(
                 int(key.split('.')[3]) for key in weights if key.startswith(f'{side}.encoder')

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from peace_ros.domain import Frame, ImageError
+from peace_ros.domain import ConfigurationError, Frame
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,16 +55,22 @@ def divide_pictures(frames: Sequence[Frame] | None) -> tuple[list[Frame], list[F
 
 
 def read_pictures(folder: Path, most: int = 16) -> list[Frame]:
-    """Read the first images of a folder in the order of their names; raises ImageError."""
+    """Read the first images of a folder in the order of their names; raises ConfigurationError."""
+    if not folder.is_dir():
+        raise ConfigurationError(f'{folder}: no such folder; give a folder of photos')
     files = sorted(each for each in folder.glob('*') if each.suffix.lower() in _SUFFIXES)[:most]
     frames = []
     for file in files:
         image = cv2.imread(str(file), cv2.IMREAD_COLOR)
         if image is None:
-            raise ImageError(f'{file}: not a readable image; remove it or give another folder')
+            raise ConfigurationError(
+                f'{file}: not a readable image; remove it or give another folder'
+            )
         frames.append(Frame(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8), 0))
     if not frames:
-        raise ImageError(f'{folder}: no {", ".join(_SUFFIXES)} in it; give a folder of photos')
+        raise ConfigurationError(
+            f'{folder}: no {", ".join(_SUFFIXES)} in it; give a folder of photos'
+        )
     return frames
 
 

@@ -108,6 +108,7 @@ def from_network(
 
 
 def _from_checkpoint(checkpoint: Path, side_px: int) -> SegmenterSource:
+    _require_file(checkpoint)  # ultralytics would look for it on the network
     try:
         ultralytics = importlib.import_module('ultralytics')
     except ImportError as error:
@@ -117,7 +118,6 @@ def _from_checkpoint(checkpoint: Path, side_px: int) -> SegmenterSource:
             f'exported elsewhere (.onnx). {LICENCE_NOTE}'
         ) from error
     _LOG.warning('%s: %s', checkpoint, LICENCE_NOTE)
-    _require_file(checkpoint)  # ultralytics would look for it on the network
     try:
         model = ultralytics.YOLO(str(checkpoint)).model.float()
     except Exception as error:  # unpickling raises whatever the file makes it raise

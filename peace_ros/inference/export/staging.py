@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -12,6 +13,8 @@ from pathlib import Path
 
 from peace_ros.domain import BundleError
 from peace_ros.inference.bundle import put_in_place
+
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @contextmanager
@@ -31,7 +34,12 @@ def staged(folder: Path) -> Iterator[Path]:
         finally:
             shutil.rmtree(stage, ignore_errors=True)
     except OSError as error:
+        remedy = (
+            'a full-size bundle needs up to 3 GB while it is made: free some space or choose '
+            'another folder'
+            if error.errno in _NO_ROOM
+            else 'choose a folder that can be written'
+        )
         raise BundleError(
-            f'{folder}: {error.strerror or error}; a full-size bundle needs up to 3 GB while it is '
-            'made: free some space or choose another folder (a bundle that was there is untouched)'
+            f'{folder}: {error.strerror or error}; {remedy} (a bundle that was there is untouched)'
         ) from error

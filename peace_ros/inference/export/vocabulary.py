@@ -79,7 +79,8 @@ class Vocabulary:
         tokenizer.add_special_tokens([START_OF_TEXT, END_OF_TEXT])
         tokenizer.enable_padding(pad_id=self.end_of_text, pad_token=END_OF_TEXT)
         tokenizer.enable_truncation(context_length)
-        tokenizer.save(str(path))
+        # Its own save raises no OSError when a disk is full.
+        path.write_text(tokenizer.to_str(pretty=True), encoding='utf-8')
 
 
 def shipped_vocabulary() -> Vocabulary:

@@ -167,6 +167,28 @@ def test_a_full_disk_is_said_and_the_old_bundle_stays(
     assert Bundle.load(tmp_path / 'here').checksum == old.checksum
 
 
+@pytest.mark.parametrize(
+    ('index', 'told'),
+    [
+        ('nowhere/index.json', r'index\.json: cannot be reached .*No such file.*; check the path'),
+        ('ftp://nowhere/index.json', 'give a URL that begins with http, https, file'),
+        ('http://127.0.0.1:9/index.json', r'\(.*refused\); check the network and call again'),
+    ],
+)
+def test_an_index_that_cannot_be_read_is_refused(tmp_path: Path, index: str, told: str) -> None:
+    with pytest.raises(BundleError, match=told):
+        fetch_bundle('clip-tiny', index, tmp_path / 'here', no_progress)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_server_without_the_files_says_whom_to_ask(
+    server: Any, bundle_folder: Path, tmp_path: Path
+) -> None:
+    (bundle_folder / 'text_encoder.onnx').unlink()
+    with pytest.raises(BundleError, match=r'404 .*; check --index or ask who keeps it'):
+        fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
+
+
 def test_an_index_on_disk_will_do(bundle_folder: Path, tmp_path: Path) -> None:
     index = str(bundle_folder.parent / 'index.json')
     assert fetch_bundle('clip-tiny', index, tmp_path / 'here', no_progress)
