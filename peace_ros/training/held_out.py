@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 _LEAST_SIDE_PX = 300
 """Smaller cuts than the network's input would only be blown up."""
+_MOST_SIDE_PX = 512
+"""Pixels of all views are pooled, and a sharp photograph is not worth more than a coarse one."""
 _LABELS = np.arange(PIXEL_CLASS_COUNT, dtype=np.uint8)
 # What may be either does not count; all that is certain of NOT_SAFE is that nobody may land on it.
 _LABELS[[VEGETATION, LOOSE_SURFACE]] = Label.UNLABELED
@@ -67,8 +69,9 @@ def write_views(real: Path, out: Path) -> int:
         labels = _LABELS[rasterise(annotation, image.shape[1], image.shape[0])]
         for left, top, side in squares(image.shape[1], image.shape[0]):
             cut = np.s_[top : top + side, left : left + side]
-            _write(out / 'images' / f'{annotation.name}_{side}_{left}_{top}.png', image[cut])
-            _write(out / 'labels' / f'{annotation.name}_{side}_{left}_{top}.png', labels[cut])
+            name = f'{annotation.name}_{side}_{left}_{top}.png'
+            _write(out / 'images' / name, image[cut], cv2.INTER_AREA)
+            _write(out / 'labels' / name, labels[cut], cv2.INTER_NEAREST)
             count += 1
     if not count:
         names = ', '.join(each.name for each in load_annotations() if each.is_validation)
@@ -77,9 +80,10 @@ def write_views(real: Path, out: Path) -> int:
     return count
 
 
-def _write(path: Path, picture: NDArray[np.uint8]) -> None:
+def _write(path: Path, picture: NDArray[np.uint8], shrink: int) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(path), picture)
+    side = min(_MOST_SIDE_PX, picture.shape[0])
+    cv2.imwrite(str(path), cv2.resize(picture, (side, side), interpolation=shrink))
 
 
 def main(

@@ -27,7 +27,7 @@ def test_what_is_kept_for_validation_becomes_views_and_never_a_source(tmp_path: 
     for name in kept:
         paths = sorted((tmp_path / 'out' / 'labels').glob(f'{name}_*.png'))
         labels = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in paths]
-        assert {each.shape for each in labels} == {(600, 600), (300, 300)}
+        assert {each.shape for each in labels} == {(512, 512), (300, 300)}
         seen = set(np.unique(np.concatenate([each.ravel() for each in labels])).tolist())
         assert seen <= set(Label)
         assert seen & {Label.GRASS, Label.BARE_GROUND}
