@@ -26,7 +26,7 @@ from peace_ros.nodes.messages import (
     stamp_ns,
 )
 
-pytestmark = [pytest.mark.export, pytest.mark.integration]
+pytestmark = [pytest.mark.export, pytest.mark.integration, pytest.mark.slow]
 
 LIMIT_S = 240.0
 

@@ -353,3 +353,22 @@ def test_a_class_token_is_repeated_for_every_image(tmp_path: Path) -> None:
     for image, embedding in zip(images, together, strict=True):
         (alone,) = one.run(['image_embedding'], {'pixel_values': image[None]})
         np.testing.assert_allclose(embedding, alone[0], atol=1e-6)
+
+
+@pytest.mark.slow
+def test_the_true_size_fastsam_agrees(clip: Bundle, tmp_path: Path) -> None:
+    from peace_ros.inference.export.fastsam import export_fastsam
+    from peace_ros.inference.export.pictures import draw_pictures
+    from peace_ros.inference.export.random_fastsam import random_fastsam
+    from peace_ros.inference.export.segmenters import from_network
+
+    source = from_network(
+        random_fastsam('s'), 'fastsam-s', 640, licence='none', provenance='random weights'
+    )
+    frames = draw_pictures(1)
+    agreement = export_fastsam(source, clip, tmp_path / 'fastsam-s', frames=frames)
+    assert agreement.box_error_px <= 0.01
+    assert agreement.error <= 1e-3
+    outputs = onnx.load(str(tmp_path / 'fastsam-s' / 'segmenter.onnx')).graph.output
+    sizes = {tuple(d.dim_value for d in each.type.tensor_type.shape.dim) for each in outputs}
+    assert sizes == {(1, 37, 8400), (1, 32, 160, 160)}

@@ -73,6 +73,7 @@ def test_layer_norm_and_softmax_stay_fp32_in_fp16(small_clip: Any, tmp_path: Pat
     assert halves
 
 
+@pytest.mark.slow
 def test_the_true_size_clipseg_runs_ten_of_twelve_layers_and_agrees(tmp_path: Path) -> None:
     model = random_clipseg('rd64')
     folder = tmp_path / 'clipseg-rd64'
@@ -93,6 +94,7 @@ def test_the_true_size_clipseg_runs_ten_of_twelve_layers_and_agrees(tmp_path: Pa
     assert heatmaps[0].safety.std() > 0.01
 
 
+@pytest.mark.slow
 def test_the_true_size_clip_agrees(tmp_path: Path) -> None:
     folder = tmp_path / 'clip-vit-b-32'
     source = from_model('clip', 'clip', random_clip('ViT-B/32'))
