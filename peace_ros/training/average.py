@@ -9,7 +9,6 @@ models, CVPR 2022).
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 from pathlib import Path
@@ -22,6 +21,8 @@ from onnx import numpy_helper
 
 from peace_ros.domain import BundleError, ConfigurationError
 from peace_ros.inference import Bundle
+from peace_ros.inference.bundle import MANIFEST_NAME, file_entry
+from peace_ros.inference.export.staging import staged
 
 _FLOATS = (np.float16, np.float32)
 
@@ -38,14 +39,14 @@ def average(before: Path, after: Path, out: Path, share: float) -> None:
     first, second = Bundle.load(before), Bundle.load(after)
     if first.paths.keys() != second.paths.keys():
         raise ConfigurationError(f'{before} and {after}: not bundles of one family')
-    if out.resolve() in (before.resolve(), after.resolve()):
-        raise ConfigurationError(f'--out {out}: give another folder than those of the bundles')
-    shutil.copytree(after, out, dirs_exist_ok=True)
-    for role, path in second.paths.items():
-        if path.suffix == '.onnx':
-            mixed = _mix(onnx.load(str(first.paths[role])), onnx.load(str(path)), share, role)
-            onnx.save(mixed, str(out / path.name))
-    _describe(out, share)
+    with staged(out) as stage:
+        for role, path in second.paths.items():
+            if path.suffix == '.onnx':
+                mixed = _mix(onnx.load(str(first.paths[role])), onnx.load(str(path)), share, role)
+                onnx.save(mixed, str(stage / path.name))
+            else:
+                shutil.copy2(path, stage)
+        _describe(second.folder / MANIFEST_NAME, stage, share)
 
 
 def _mix(
@@ -67,21 +68,16 @@ def _mix(
     return after
 
 
-def _describe(folder: Path, share: float) -> None:
-    """Bring the manifest up to date; a threshold that was chosen before means nothing now."""
-    path = folder / 'manifest.json'
-    manifest = json.loads(path.read_text(encoding='utf-8'))
-    for name in manifest['files']:
-        content = (folder / name).read_bytes()
-        manifest['files'][name] = {
-            'sha256': hashlib.sha256(content).hexdigest(),
-            'bytes': len(content),
-        }
+def _describe(template: Path, folder: Path, share: float) -> None:
+    """Write the manifest, without the threshold: it was chosen for other weights."""
+    manifest = json.loads(template.read_text(encoding='utf-8'))
+    manifest['files'] = {name: file_entry(folder / name) for name in manifest['files']}
     manifest['provenance'] += (
         f' Averaged: {share:g} of these weights and {1.0 - share:g} of those it went on from.'
     )
     manifest['recommended'] = {}
-    path.write_text(json.dumps(manifest, indent=2) + '\n', encoding='utf-8')
+    text = json.dumps(manifest, indent=2) + '\n'
+    (folder / MANIFEST_NAME).write_text(text, encoding='utf-8')
 
 
 def main(

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import warnings
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from peace_ros.domain import Label
+from peace_ros.inference.bundle import file_entry
 from peace_ros.training.backbone import MEAN, STD
 from peace_ros.training.networks import (
     EMBEDDING_WIDTH,
@@ -197,10 +197,7 @@ def write_manifest(
 ) -> None:  # fmt: skip
     """Write tokenizer and manifest; the manifest comes last and vouches for every file."""
     save_tokenizer(folder / roles['tokenizer'])
-    files = {}
-    for name in roles.values():
-        content = (folder / name).read_bytes()
-        files[name] = {'sha256': hashlib.sha256(content).hexdigest(), 'bytes': len(content)}
+    files = {name: file_entry(folder / name) for name in roles.values()}
     manifest: dict[str, Any] = {
         'format': 1,
         'name': folder.name,
