@@ -17,7 +17,13 @@ from peace_ros import entry
 
 ROOT = Path(__file__).resolve().parents[1]
 SLOW = 'import time\nprint("importing", flush=True)\ntime.sleep(60)\n'
-CALL = 'import sys\nfrom peace_ros.entry import start\nsys.exit(start(sys.argv[1]))\n'
+CALL = (
+    'import signal, sys\n'
+    # As in a terminal; a suite that runs in the background hands on interrupts that are ignored.
+    'signal.signal(signal.SIGINT, signal.default_int_handler)\n'
+    'from peace_ros.entry import start\n'
+    'sys.exit(start(sys.argv[1]))\n'
+)
 
 
 def start(folder: Path, source: str) -> subprocess.Popen[str]:
