@@ -356,19 +356,20 @@ def test_a_class_token_is_repeated_for_every_image(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_true_size_fastsam_agrees(clip: Bundle, tmp_path: Path) -> None:
+@pytest.mark.parametrize('size', ['s', 'x'])
+def test_the_true_size_fastsam_agrees(clip: Bundle, tmp_path: Path, size: str) -> None:
     from peace_ros.inference.export.fastsam import export_fastsam
     from peace_ros.inference.export.pictures import draw_pictures
     from peace_ros.inference.export.random_fastsam import random_fastsam
     from peace_ros.inference.export.segmenters import from_network
 
     source = from_network(
-        random_fastsam('s'), 'fastsam-s', 640, licence='none', provenance='random weights'
+        random_fastsam(size), 'fastsam', 640, licence='none', provenance='random weights'
     )
     frames = draw_pictures(1)
-    agreement = export_fastsam(source, clip, tmp_path / 'fastsam-s', frames=frames)
+    agreement = export_fastsam(source, clip, tmp_path / 'fastsam', frames=frames)
     assert agreement.box_error_px <= 0.01
     assert agreement.error <= 1e-3
-    outputs = onnx.load(str(tmp_path / 'fastsam-s' / 'segmenter.onnx')).graph.output
+    outputs = onnx.load(str(tmp_path / 'fastsam' / 'segmenter.onnx')).graph.output
     sizes = {tuple(d.dim_value for d in each.type.tensor_type.shape.dim) for each in outputs}
     assert sizes == {(1, 37, 8400), (1, 32, 160, 160)}

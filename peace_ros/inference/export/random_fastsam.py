@@ -65,6 +65,7 @@ def _calm_the_heads(network: Yolo) -> None:
     """Scale the last layers so that their answers spread as much as trained ones do."""
     outputs: dict[nn.Module, torch.Tensor] = {}
     heads = [head[-1] for each in network.head_lists for head in each]
+    heads.append(network.prototypes[-1][0])
     hooks = [
         head.register_forward_hook(lambda head, _, answer: outputs.update({head: answer}))
         for head in heads
