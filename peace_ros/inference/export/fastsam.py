@@ -23,7 +23,7 @@ from peace_ros.inference.contract import IMAGE_EMBEDDING, PIXEL_VALUES, PREDICTI
 from peace_ros.inference.export.batching import free_batch
 from peace_ros.inference.export.convolutions import to_int8_convolutions
 from peace_ros.inference.export.pictures import divide_pictures, draw_pictures
-from peace_ros.inference.export.precision import to_fp16
+from peace_ros.inference.export.precision import require_finite, to_fp16
 from peace_ros.inference.export.segmenters import Outputs, SegmenterSource, load_segmenter
 from peace_ros.inference.export.staging import staged
 from peace_ros.inference.manifest import FORMAT, PRECISIONS, InputSpec
@@ -142,6 +142,7 @@ def verify_segmenter(
     worst = SegmenterAgreement(0.0, 0.0, 1.0, 1.0)
     for pixels in images:
         predictions, prototypes = session.run([PREDICTIONS, PROTOTYPES], {PIXEL_VALUES: pixels})
+        require_finite([predictions, prototypes], bundle.manifest.precision, source.name)
         found = _compare((predictions, prototypes), source.run(pixels), source.side_px)
         worst = SegmenterAgreement(
             max(worst.box_error_px, found.box_error_px),

@@ -11,16 +11,32 @@ import onnx
 from onnx import NodeProto, helper, numpy_helper
 from onnxruntime.transformers.float16 import DEFAULT_OP_BLOCK_LIST, convert_float_to_float16
 
+from peace_ros.domain import BundleError
+
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
+    from numpy.typing import NDArray
     from onnx import GraphProto
 
     from peace_ros.inference.export.activations import Scale
 
 _KEEP_FP32 = ('LayerNormalization', 'Softmax', 'ArgMax')
 """Sums over hundreds of squares overflow in fp16; TensorRT fuses these as they stand."""
+
+
+def require_finite(arrays: Iterable[NDArray[Any]], precision: str, what: str) -> None:
+    """Raise BundleError when a network answers with numbers that its precision cannot hold.
+
+    To be asked before such answers are compared: the larger one of a number and NaN may be either.
+    """
+    for array in arrays:
+        if not np.isfinite(array).all():
+            raise BundleError(
+                f'{what} in {precision} answers with infinite numbers, or with none (NaN), on a '
+                'picture. Nothing was written; choose another precision, fp32 if this is not it'
+            )
 
 
 def to_fp16(path: Path) -> None:

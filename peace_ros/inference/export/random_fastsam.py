@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 from torch import nn
 
 from peace_ros.domain import ConfigurationError
+from peace_ros.inference.export.pictures import draw_pictures
+from peace_ros.inference.manifest import InputSpec
+from peace_ros.inference.preprocess import Preprocessor
 
 MASKS = 32
 STRIDES_PX = (8, 16, 32)
@@ -24,10 +27,8 @@ _CELL_PX = 4
 _BINS = 16
 _SIZES = {'s': (1 / 3, 0.5, 1024), 'x': (1.0, 1.25, 512)}
 """Depth and width factors, and the widest layer before the factor."""
-_SILU_GAIN = 1.68
-"""Keeps the spread of activations from layer to layer."""
-_STEP_GAIN = 0.5
-"""Of what a step adds to what passes."""
+_CALM = 0.25
+"""How large what a step adds to what passes is, and what a head says; all else is about one."""
 _FAINT = 1e-30
 """Small enough that a planted value stays as it is, yet nothing that an optimiser may drop."""
 
@@ -47,34 +48,42 @@ def random_fastsam(size: str = 's', *, side_px: int = 640, planted: int = 0, see
     torch.manual_seed(seed)
     network = Yolo(*_SIZES[size], side_px).eval()
     with torch.no_grad():
-        for module in network.modules():
-            if isinstance(module, nn.Conv2d):
-                fan_in = module.in_channels * module.kernel_size[0] ** 2
-                module.weight.normal_(0.0, _SILU_GAIN * fan_in**-0.5)
-                module.bias.zero_()
-            elif isinstance(module, _SplitBlock) and module.add:
-                for step in module.steps:
-                    step[-1][0].weight.mul_(_STEP_GAIN)
-        _calm_the_heads(network)
+        draw_weights(network)
     if planted:
         network.plant(*plant_ellipses(planted, side_px, seed))
     return network
 
 
-def _calm_the_heads(network: Yolo) -> None:
-    """Scale the last layers so that their answers spread as much as trained ones do."""
-    outputs: dict[nn.Module, torch.Tensor] = {}
-    heads = [head[-1] for each in network.head_lists for head in each]
-    heads.append(network.prototypes[-1][0])
-    hooks = [
-        head.register_forward_hook(lambda head, _, answer: outputs.update({head: answer}))
-        for head in heads
-    ]
-    network(torch.rand(1, 3, network.side_px, network.side_px))
+def draw_weights(network: Yolo) -> None:
+    """Draw the weights so that what every layer says is about as large as one, as in trained ones.
+
+    Layer by layer, while a picture runs through (D. Mishkin, J. Matas, All you need is a good init,
+    ICLR 2016). Otherwise the deeper of the two leaves the numbers that fp16 has. Steps that add to
+    what passes say less, or a network this deep would blow up roundings.
+    """
+    sizes: dict[nn.Module, float] = {}
+    for module in network.modules():
+        if isinstance(module, nn.Conv2d | nn.ConvTranspose2d):
+            sizes.setdefault(module, 1.0)
+            module.weight.normal_()
+            if module.bias is not None:
+                module.bias.zero_()
+        elif isinstance(module, _SplitBlock) and module.add:
+            sizes |= {step[-1][0]: _CALM for step in module.steps}
+    sizes |= {head[-1]: _CALM for each in network.head_lists for head in each}
+
+    def level(layer: nn.Conv2d, _: tuple[torch.Tensor, ...], answer: torch.Tensor) -> torch.Tensor:
+        factor = sizes[layer] / (answer.square().mean().sqrt() + 1e-6)
+        layer.weight.mul_(factor)
+        return answer * factor
+
+    hooks = [layer.register_forward_hook(level) for layer in sizes]
+    (picture,) = draw_pictures(1)
+    side_px = network.side_px
+    plain = Preprocessor(InputSpec(side_px, side_px, 'stretch', (0.0,) * 3, (1.0,) * 3))
+    network(torch.from_numpy(plain(picture.image_rgb)))
     for hook in hooks:
         hook.remove()
-    for head in heads:
-        head.weight.div_(outputs[head].std() + 1e-6)
 
 
 class Yolo(nn.Module):

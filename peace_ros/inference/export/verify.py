@@ -23,6 +23,7 @@ from peace_ros.inference.contract import (
     TEXT_EMBEDDING,
 )
 from peace_ros.inference.export import pictures
+from peace_ros.inference.export.precision import require_finite
 from peace_ros.inference.preprocess import Preprocessor
 from peace_ros.inference.session import Session, open_sessions
 from peace_ros.inference.tokenizer import Tokenizer
@@ -116,9 +117,10 @@ def compare(source: Source, bundle: Bundle, frames: Sequence[Frame]) -> Agreemen
     tokens = tokenizer(pictures.TEXTS)
     preprocess = Preprocessor(bundle.manifest.input)
     check = _compare_clipseg if source.family == 'clipseg' else _compare_clip
-    return agreement_of(
-        [check(source.model, sessions, tokens, preprocess(each.image_rgb)) for each in frames]
-    )
+    found = [check(source.model, sessions, tokens, preprocess(each.image_rgb)) for each in frames]
+    numbers = np.array([each[:2] for each in found])
+    require_finite([numbers], bundle.manifest.precision, source.name)
+    return agreement_of(found)
 
 
 def agreement_of(found: Sequence[Answers]) -> Agreement:

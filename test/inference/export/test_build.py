@@ -149,6 +149,19 @@ def test_a_bundle_that_does_not_agree_leaves_the_old_one(
     assert [each.name for each in tmp_path.iterdir()] == ['clip']
 
 
+@pytest.mark.parametrize('lost', [0, 1])
+def test_an_answer_of_no_number_on_any_picture_is_refused(
+    small_clip: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lost: int
+) -> None:
+    found = [verify.Answers(1e-6, 1.0), verify.Answers(1e-6, 1.0)]
+    found[lost] = verify.Answers(float('nan'), float('nan'))
+    monkeypatch.setattr(verify, '_compare_clip', lambda *_: found.pop(0))
+    source = from_model('small', 'clip', small_clip)
+    with pytest.raises(BundleError, match=r'small in fp16 answers with .* none \(NaN\)'):
+        build_bundle(source, tmp_path / 'clip', precision='fp16', frames=sources_frames(2))
+    assert not (tmp_path / 'clip').exists()
+
+
 def test_masks_that_differ_are_refused_though_scores_agree() -> None:
     verify.Agreement(0.1, 0.9999, 0.99, median_iou=0.985, mask_iou=0.9).refuse_if_poor('int8', '-')
     poor = verify.Agreement(0.1, 0.9999, 0.99, median_iou=0.975, mask_iou=0.99)
