@@ -26,9 +26,10 @@ CALM_S = 1.0
 vehicle that climbs has to stop first."""
 LATERAL_SPAN_S = 2.0
 """Sideways ways are compared over this time,"""
+LATERAL_LAG_S = 1.0
+"""with this lag and without, for the vehicle leans before it moves,"""
 SETTLED_S = 2.5
-"""and only when what it was told has pointed that way for so long before: it has to lean first,
-and to turn around."""
+"""and only when what it was told has pointed that way for so long before: it has to turn round."""
 POINTING = 0.7
 """Cosine of the angle up to which it points the same way."""
 LEAST_M = 1.0
@@ -128,14 +129,19 @@ class ObedienceWatch:
         return any(b.told_m[2] < a.told_m[2] for a, b in pairwise(recent))
 
     def _goes_there(self, at_s: float) -> str:
+        late_s = at_s - LATERAL_LAG_S
+        late_begin, late_end = self._before(late_s - LATERAL_SPAN_S), self._before(late_s)
         begin, end = self._before(at_s - LATERAL_SPAN_S), self._marks[-1]
-        if begin is None:
+        if late_begin is None or late_end is None or begin is None:
             return ''
         north, east, _ = _way(begin.told_m, end.told_m)
         told_m = hypot(north, east)
         if told_m <= LEAST_LATERAL_M:
             return ''
         along = (north / told_m, east / told_m)
+        told_m = min(told_m, _along(_way(late_begin.told_m, late_end.told_m), along))
+        if told_m <= LEAST_LATERAL_M:
+            return ''
         went_m = _along(_way(begin.seen_m, end.seen_m), along)
         if went_m >= LEAST_PART * told_m or not self._pointed(along, at_s):
             return ''

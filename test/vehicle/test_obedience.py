@@ -11,7 +11,7 @@ from itertools import accumulate
 from math import hypot, inf
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from peace_ros.simulation.autopilot.physics import Physics, VelocityCommand
@@ -202,6 +202,9 @@ def test_a_vehicle_that_is_guided_in_wind_is_believed(wind_m_s: float) -> None:
     st.sampled_from([0.0, 5.0, 10.0]),
     st.integers(0, 1000),
 )
+# A crawl that points the same way as the dash after it: the vehicle has to lean first.
+@example([(0.0, 0.0625, 4.0), (0.0, 2.0, 1.0)], 0.0, 0)
+@example([(0.0, 0.0625, 4.0), (0.0, 3.0, 4.0)], 10.0, 3)
 def test_a_vehicle_that_is_sent_here_and_there_is_believed(
     legs: list[tuple[float, float, float]], wind_m_s: float, seed: int
 ) -> None:
