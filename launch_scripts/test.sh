@@ -8,17 +8,18 @@
 #   launch_scripts/test.sh               everything but the tests of training and export
 #   launch_scripts/test.sh --training    these too (installs torch)
 #   launch_scripts/test.sh --quick       without the landing
-#   anything else is handed to pytest
+#   anything else is handed to pytest, in place of what it is given otherwise
 set -euo pipefail
 # shellcheck source=launch_scripts/environment.sh
 source "$(dirname "${BASH_SOURCE[0]}")/environment.sh"
 
 extras=wheels,test
+with_landing=yes
 pytest_arguments=()
 for argument in "$@"; do
     case $argument in
     --training) extras=wheels,test,train,export ;;
-    --quick) pytest_arguments+=(-m 'not integration') ;;
+    --quick) with_landing= ;;
     -h | --help)
         sed -n '5,12s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
         exit 0
@@ -43,4 +44,13 @@ mypy
 echo '== import rules'
 lint-imports --no-cache
 echo '== tests'
-exec python -m pytest "${pytest_arguments[@]}"
+if ((${#pytest_arguments[@]})); then
+    exec python -m pytest "${pytest_arguments[@]}"
+fi
+# Two at a time, file by file, because the processes of a file may share what they set up.
+python -m pytest -m 'not integration' -n 2 --dist loadfile --durations=10
+if [[ $with_landing ]]; then
+    echo '== landing'
+    # Alone: these processes have deadlines to keep, and both cores to keep them with.
+    python -m pytest -m integration
+fi

@@ -111,7 +111,7 @@ def test_from_every_state_good_data_lead_to_the_handover(state, altitude_m):
 
 
 @pytest.mark.parametrize('policy', ['hold', 'return', 'best_site'])
-@pytest.mark.parametrize('state', set(State) - FINAL)
+@pytest.mark.parametrize('state', sorted(set(State) - FINAL))
 def test_from_every_state_nothing_safe_leads_to_an_end(state, policy):
     parameters = LandingParameters(budget_policy=policy, max_search_s=20.0, max_total_s=60.0)
     trip = Trip(parameters, altitude_m=45.0, state=state)
