@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Things pasted onto views, because real images hold too few of them: cars, people, roofs, pools.
+"""Things pasted onto views, because real images hold too few: cars, people, roofs, pools, courts.
 
 All functions change image (uint8 RGB) and classes (uint8) in place.
 """
@@ -29,6 +29,13 @@ _WATER_COLOURS = (
     (85, 85, 65), (60, 120, 130), (20, 28, 30), (95, 110, 100), (90, 75, 50), (50, 90, 75),
     (45, 65, 50), (58, 78, 62), (72, 92, 76), (66, 86, 58), (40, 58, 40), (84, 100, 72),
 )  # fmt: skip
+
+_COURT_COLOURS = (
+    (60, 110, 80), (75, 125, 85), (50, 90, 60), (50, 85, 130), (65, 105, 150), (40, 65, 110),
+    (165, 85, 65), (150, 70, 55), (120, 120, 118), (95, 98, 100), (110, 75, 120), (180, 120, 90),
+)  # fmt: skip
+_LIKE_GROUND = 0.3
+"""Of the waters: as green or as brown as the ground around, so that colour alone says nothing."""
 
 _CROWN_COLOURS = (
     (70, 95, 50), (50, 75, 40), (110, 120, 60), (150, 110, 50), (170, 90, 50), (120, 70, 60),
@@ -223,7 +230,8 @@ def paste_water(image: Image, classes: Image, rng: np.random.Generator) -> None:
     inside = np.asarray(cv2.medianBlur(mask, soft)) > 127
     if not inside.any():
         return
-    image[inside] = water_texture(rng, height, side)[inside]
+    base = _water_colour(image, classes, rng)
+    image[inside] = water_texture(rng, height, side, base)[inside]
     classes[inside] = Label.WATER
 
 
@@ -279,9 +287,49 @@ def paste_tree(
     classes[mask] = Label.TREE
 
 
-def water_texture(rng: np.random.Generator, height: int, width: int) -> Image:
+def paste_court(image: Image, classes: Image, rng: np.random.Generator, gsd_m: float) -> None:
+    """Paste a painted hard court with its lines: smooth and often green, and yet paved."""
+    length, width = rng.uniform(14, 40) / gsd_m, rng.uniform(8, 20) / gsd_m
+    if width < 12.0:
+        return
+    height, side = image.shape[:2]
+    centre = (rng.uniform(0, side), rng.uniform(0, height))
+    angle = rng.uniform(0, np.pi)
+    body = _rectangle(centre, length, width, angle)
+    apron = np.array(_jittered(rng, _COURT_COLOURS, 8))
+    _fill(image, body, tuple(apron))
+    field = _rectangle(centre, 0.82 * length, 0.78 * width, angle)
+    # Every other court has a field of a second colour.
+    if rng.random() < 0.5:
+        _fill(image, field, _jittered(rng, _COURT_COLOURS, 8))
+    mask = _mask(image.shape, body)
+    grain = rng.normal(0, rng.uniform(1, 5), mask.sum())[:, None]
+    image[mask] = np.clip(image[mask] + grain, 0, 255).astype(np.uint8)
+    line = (float(rng.uniform(200, 250)),) * 3
+    thick = max(1, round(0.07 / gsd_m))
+    middle = np.array([(field[0] + field[1]) / 2, (field[2] + field[3]) / 2])
+    for points, closed in ((field, True), (middle, False)):
+        whole = [np.round(points * 16).astype(np.int32)]
+        cv2.polylines(image, whole, closed, line, thick, cv2.LINE_AA, 4)
+    ring = (float(centre[0]), float(centre[1])), (0.2 * width,) * 2, 0.0
+    cv2.ellipse(image, ring, line, thick, cv2.LINE_AA)
+    classes[mask] = Label.PAVED
+
+
+def _water_colour(image: Image, classes: Image, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Return the colour of some water, or of the plants and the ground that are in the view."""
+    around = np.isin(classes, (Label.GRASS, Label.BARE_GROUND, Label.TREE))
+    if rng.random() < _LIKE_GROUND and around.any():
+        label = rng.choice(np.unique(classes[around]))
+        mean = image[classes == label].mean(axis=0)
+        return np.asarray(mean * rng.uniform(0.6, 1.15) + rng.normal(0, 6, 3))
+    return np.array(_jittered(rng, _WATER_COLOURS, 8)) * rng.uniform(0.7, 1.5)
+
+
+def water_texture(
+    rng: np.random.Generator, height: int, width: int, base: NDArray[np.float64]
+) -> Image:
     """Return a water surface (uint8 RGB): one hue, slow shading, ripples, sometimes glints."""
-    base = np.array(_jittered(rng, _WATER_COLOURS, 8)) * rng.uniform(0.7, 1.5)
     slow = cv2.resize(
         rng.normal(0, 1, (5, 5)).astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC
     )
@@ -304,6 +352,6 @@ def recolour_water(image: Image, classes: Image, rng: np.random.Generator) -> No
     if not inside.any():
         return
     grey = image[inside].astype(np.float32).mean(axis=1)
-    colour = np.array(_jittered(rng, _WATER_COLOURS, 8)) * rng.uniform(0.7, 1.5)
+    colour = _water_colour(image, classes, rng)
     ratio = np.clip(grey / (grey.mean() + 1e-3), 0.3, 2.5)
     image[inside] = np.clip(ratio[:, None] * colour, 0, 255).astype(np.uint8)

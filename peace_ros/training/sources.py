@@ -7,6 +7,7 @@ from __future__ import annotations
 import csv
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -191,7 +192,8 @@ def load_drawn(
         if not path.exists()
     ]
     if jobs and workers > 1:
-        with ProcessPoolExecutor(workers) as pool:
+        # Not by forking: threads of torch or of a test runner may hold locks, which stay held.
+        with ProcessPoolExecutor(workers, get_context('spawn')) as pool:
             for done, _ in enumerate(pool.map(_cached_scene, jobs, chunksize=4)):
                 if report is not None:
                     report(len(paths) - len(jobs) + done + 1)

@@ -75,6 +75,22 @@ def cut(
     )
 
 
+def _paste_surfaces(
+    image: NDArray[np.uint8],
+    classes: NDArray[np.uint8],
+    rng: np.random.Generator,
+    gsd_m: float,
+    *,
+    real: bool,
+) -> None:
+    if rng.random() < 0.7:
+        pasting.recolour_water(image, classes, rng)
+    if rng.random() < (0.4 if real else 0.25):
+        pasting.paste_water(image, classes, rng)
+    if rng.random() < (0.1 if real else 0.05):
+        pasting.paste_court(image, classes, rng, gsd_m)
+
+
 def _paste(
     source: Source,
     image: NDArray[np.uint8],
@@ -86,10 +102,7 @@ def _paste(
     real = source.kind != 'drawn'
     azimuth, reach = rng.uniform(0, 2 * np.pi), rng.uniform(0.2, 1.6)
     sun = np.array([np.cos(azimuth), np.sin(azimuth)]) * reach
-    if rng.random() < 0.7:
-        pasting.recolour_water(image, classes, rng)
-    if rng.random() < (0.4 if real else 0.25):
-        pasting.paste_water(image, classes, rng)
+    _paste_surfaces(image, classes, rng, gsd_m, real=real)
     if rng.random() < (0.3 if real else 0.1):
         most = int(np.clip(gsd_m * image.shape[0] / 9.0, 2, 7))
         for _ in range(int(rng.integers(1, most))):

@@ -276,7 +276,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Recipe, set
     torch.set_num_threads(1)
     recipe = Recipe(
         out=folder / 'models', work=folder / 'work', steps=3, scenes=3, choice_scenes=1,
-        batch_size=2, views_of_crops=1, scene_px=256, side_px=96, shifts=(0.0,),
+        batch_size=2, views_of_crops=3, scene_px=256, side_px=96, shifts=(0.0,),
     )  # fmt: skip
     stages: set[str] = set()
     run(recipe, lambda stage, *_: stages.add(stage))

@@ -112,3 +112,29 @@ def test_labels_of_a_drawn_view_take_other_tones_each_by_itself() -> None:
     changed = {tuple(each[0, 0].tolist()) for each in tones}
     assert len(changed) > 4
     assert (120, 120, 120) in changed
+
+
+def test_a_pasted_court_is_paved_smooth_and_lined() -> None:
+    image = np.full((160, 160, 3), 128, dtype=np.uint8)
+    classes = np.full((160, 160), Label.GRASS, dtype=np.uint8)
+    pasting.paste_court(image, classes, np.random.default_rng(2), 0.15)
+    court = classes == Label.PAVED
+    assert 0.02 < court.mean() < 0.9
+    assert set(np.unique(classes)) == {Label.GRASS, Label.PAVED}
+    assert (image[~court] == 128).all(axis=1).mean() > 0.98
+    bright = image[court].min(axis=1) > 190
+    assert 0.01 < bright.mean() < 0.4
+
+
+def test_some_pasted_waters_look_like_the_lawn_around_them() -> None:
+    lawn = np.array([60, 140, 40])
+    greens = 0
+    for seed in range(40):
+        image = np.full((96, 96, 3), lawn, dtype=np.uint8)
+        classes = np.full((96, 96), Label.GRASS, dtype=np.uint8)
+        pasting.paste_water(image, classes, np.random.default_rng(seed))
+        water = classes == Label.WATER
+        if water.any():
+            colour = image[water].mean(axis=0)
+            greens += abs(colour / colour.sum() - lawn / lawn.sum()).max() < 0.05
+    assert 6 <= greens <= 30
