@@ -52,6 +52,19 @@ def _rectangle(
     return np.array([centre + a * length * along + b * width * across for a, b in corners])
 
 
+def _somewhere(image: Image, rng: np.random.Generator) -> tuple[tuple[float, float], float]:
+    """Return a place in the image and a direction."""
+    height, side = image.shape[:2]
+    centre = (rng.uniform(0, side), rng.uniform(0, height))
+    return centre, rng.uniform(0, np.pi)
+
+
+def _grain(image: Image, mask: NDArray[np.bool_], rng: np.random.Generator, most: float) -> None:
+    """Roughen what a mask covers, by up to ``most`` grey levels (one sigma)."""
+    noise = rng.normal(0, rng.uniform(1, most), mask.sum())[:, None]
+    image[mask] = np.clip(image[mask] + noise, 0, 255).astype(np.uint8)
+
+
 def _fill(image: Image, polygon: NDArray[np.float64], colour: tuple[float, ...]) -> None:
     points = np.round(polygon * 16).astype(np.int32)
     cv2.fillPoly(image, [points], colour, cv2.LINE_AA, 4)
@@ -94,9 +107,7 @@ def paste_car(
     length, width = length_m / gsd_m, width_m / gsd_m
     if length < 3.0:
         return
-    height, side = image.shape[:2]
-    centre = (rng.uniform(0, side), rng.uniform(0, height))
-    angle = rng.uniform(0, np.pi)
+    centre, angle = _somewhere(image, rng)
     body = _rectangle(centre, length, width, angle)
     tall = 1.4 if kind < 0.8 else 2.8
     darken(image, body + sun * tall / gsd_m, rng.uniform(0.35, 0.6))
@@ -175,9 +186,7 @@ def paste_roof(
 ) -> None:
     """Paste a house: flat or with two slopes, plain or ribbed, in any roof colour, with shadow."""
     length, width = rng.uniform(5, 22) / gsd_m, rng.uniform(4, 12) / gsd_m
-    height, side = image.shape[:2]
-    centre = (rng.uniform(0, side), rng.uniform(0, height))
-    angle = rng.uniform(0, np.pi)
+    centre, angle = _somewhere(image, rng)
     body = _rectangle(centre, length, width, angle)
     tall = rng.uniform(2.5, 9) / gsd_m
     hull = cv2.convexHull(np.vstack([body, body + sun * tall]).astype(np.float32))[:, 0]
@@ -200,8 +209,7 @@ def paste_roof(
             spot = (centre[0] + rng.normal(0, length / 6), centre[1] + rng.normal(0, width / 8))
             box = _rectangle(spot, 1.2 / gsd_m, 1.0 / gsd_m, angle)
             _fill(image, box, tuple(rng.uniform(60, 220) for _ in range(3)))
-    noise = rng.normal(0, rng.uniform(1, 7), mask.sum())[:, None]
-    image[mask] = np.clip(image[mask] + noise, 0, 255).astype(np.uint8)
+    _grain(image, mask, rng, 7.0)
     classes[mask] = Label.BUILDING
 
 
@@ -292,9 +300,7 @@ def paste_court(image: Image, classes: Image, rng: np.random.Generator, gsd_m: f
     length, width = rng.uniform(14, 40) / gsd_m, rng.uniform(8, 20) / gsd_m
     if width < 12.0:
         return
-    height, side = image.shape[:2]
-    centre = (rng.uniform(0, side), rng.uniform(0, height))
-    angle = rng.uniform(0, np.pi)
+    centre, angle = _somewhere(image, rng)
     body = _rectangle(centre, length, width, angle)
     apron = np.array(_jittered(rng, _COURT_COLOURS, 8))
     _fill(image, body, tuple(apron))
@@ -303,8 +309,7 @@ def paste_court(image: Image, classes: Image, rng: np.random.Generator, gsd_m: f
     if rng.random() < 0.5:
         _fill(image, field, _jittered(rng, _COURT_COLOURS, 8))
     mask = _mask(image.shape, body)
-    grain = rng.normal(0, rng.uniform(1, 5), mask.sum())[:, None]
-    image[mask] = np.clip(image[mask] + grain, 0, 255).astype(np.uint8)
+    _grain(image, mask, rng, 5.0)
     line = (float(rng.uniform(200, 250)),) * 3
     thick = max(1, round(0.07 / gsd_m))
     middle = np.array([(field[0] + field[1]) / 2, (field[2] + field[3]) / 2])

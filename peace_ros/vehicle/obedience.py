@@ -135,15 +135,15 @@ class ObedienceWatch:
         if late_begin is None or late_end is None or begin is None:
             return ''
         north, east, _ = _way(begin.told_m, end.told_m)
-        told_m = hypot(north, east)
-        if told_m <= LEAST_LATERAL_M:
+        now_m = hypot(north, east)
+        if now_m <= LEAST_LATERAL_M:
             return ''
-        along = (north / told_m, east / told_m)
-        told_m = min(told_m, _along(_way(late_begin.told_m, late_end.told_m), along))
-        if told_m <= LEAST_LATERAL_M:
-            return ''
+        along = (north / now_m, east / now_m)
+        told_m = min(now_m, _along(_way(late_begin.told_m, late_end.told_m), along))
         went_m = _along(_way(begin.seen_m, end.seen_m), along)
-        if went_m >= LEAST_PART * told_m or not self._pointed(along, at_s):
+        if told_m <= LEAST_LATERAL_M or went_m >= LEAST_PART * told_m:
+            return ''
+        if not self._pointed(along, at_s):
             return ''
         return (
             f'the vehicle was told to go {told_m:.1f} m sideways in {LATERAL_SPAN_S:g} s and '

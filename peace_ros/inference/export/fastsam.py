@@ -22,12 +22,11 @@ from peace_ros.inference.bundle import MANIFEST_NAME, Bundle, file_entry
 from peace_ros.inference.contract import IMAGE_EMBEDDING, PIXEL_VALUES, PREDICTIONS, PROTOTYPES
 from peace_ros.inference.export.batching import free_batch
 from peace_ros.inference.export.convolutions import to_int8_convolutions
-from peace_ros.inference.export.pictures import divide_pictures, draw_pictures
+from peace_ros.inference.export.pictures import divide_pictures, draw_pictures, plain_pixels
 from peace_ros.inference.export.precision import require_finite, to_fp16
 from peace_ros.inference.export.segmenters import Outputs, SegmenterSource, load_segmenter
 from peace_ros.inference.export.staging import staged
-from peace_ros.inference.manifest import FORMAT, PRECISIONS, InputSpec
-from peace_ros.inference.preprocess import Preprocessor
+from peace_ros.inference.manifest import FORMAT, PRECISIONS
 from peace_ros.inference.session import Session, open_sessions
 
 _LOG = logging.getLogger(__name__)
@@ -112,14 +111,14 @@ def export_fastsam(
     measured: Sequence[Frame] = ()
     if precision == 'int8':
         measured, frames = divide_pictures(frames)
-    images = _images(segmenter.side_px, frames or draw_pictures(_CHECKED_BATCH))
+    images = plain_pixels(frames or draw_pictures(_CHECKED_BATCH), segmenter.side_px)
     with staged(folder) as stage:
         graph = stage / 'segmenter.onnx'
         segmenter.write(graph)
         if precision == 'fp16':
             to_fp16(graph)
         elif precision == 'int8':
-            to_int8_convolutions(graph, _images(segmenter.side_px, measured))
+            to_int8_convolutions(graph, plain_pixels(measured, segmenter.side_px))
         _write_image_encoder(clip, stage / 'image_encoder.onnx')
         for role in ('text_encoder', 'tokenizer'):
             path = clip.paths[role]
@@ -152,12 +151,6 @@ def verify_segmenter(
         )
     _LOG.info('%s: %s', bundle.paths['segmenter'].name, worst)
     return worst
-
-
-def _images(side_px: int, frames: Sequence[Frame]) -> list[NDArray[np.float32]]:
-    plain = InputSpec(side_px, side_px, 'stretch', (0.0,) * 3, (1.0,) * 3)
-    preprocess = Preprocessor(plain)
-    return [preprocess(each.image_rgb).copy() for each in frames]
 
 
 def _compare(have: Outputs, wanted: Outputs, side_px: int) -> SegmenterAgreement:

@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 
 from peace_ros.domain import ConfigurationError, Frame
+from peace_ros.inference.manifest import InputSpec
+from peace_ros.inference.preprocess import Preprocessor
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -77,6 +79,12 @@ def read_pictures(folder: Path, most: int = 16) -> list[Frame]:
 def draw_pictures(count: int, seed: int = 0) -> list[Frame]:
     """Draw stand-ins for aerial photos: textured ground, a road, roofs with shadows, water."""
     return [Frame(_draw(np.random.default_rng([seed, index])), index) for index in range(count)]
+
+
+def plain_pixels(frames: Sequence[Frame], side_px: int) -> list[NDArray[np.float32]]:
+    """Return each frame as a network of its own norm takes it: [1, 3, side, side], RGB 0 to 1."""
+    preprocess = Preprocessor(InputSpec(side_px, side_px, 'stretch', (0.0,) * 3, (1.0,) * 3))
+    return [preprocess(each.image_rgb).copy() for each in frames]
 
 
 def _draw(rng: np.random.Generator) -> NDArray[np.uint8]:

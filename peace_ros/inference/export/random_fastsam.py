@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from peace_ros.domain import ConfigurationError
-from peace_ros.inference.export.pictures import draw_pictures
-from peace_ros.inference.manifest import InputSpec
-from peace_ros.inference.preprocess import Preprocessor
+from peace_ros.inference.export.pictures import draw_pictures, plain_pixels
 
 MASKS = 32
 STRIDES_PX = (8, 16, 32)
@@ -78,10 +76,8 @@ def draw_weights(network: Yolo) -> None:
         return answer * factor
 
     hooks = [layer.register_forward_hook(level) for layer in sizes]
-    (picture,) = draw_pictures(1)
-    side_px = network.side_px
-    plain = Preprocessor(InputSpec(side_px, side_px, 'stretch', (0.0,) * 3, (1.0,) * 3))
-    network(torch.from_numpy(plain(picture.image_rgb)))
+    (pixels,) = plain_pixels(draw_pictures(1), network.side_px)
+    network(torch.from_numpy(pixels))
     for hook in hooks:
         hook.remove()
 
