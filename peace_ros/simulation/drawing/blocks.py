@@ -176,7 +176,10 @@ def _city_house(
 def square(f: Furnisher, block: Block) -> None:
     """Paved or gravelled square with people, trees, kiosks."""
     rng = f.rng
-    f.fill(block, ('paving', 'red_paving', 'concrete', 'gravel', 'sand')[int(rng.integers(5))])
+    surface = ('paving', 'red_paving', 'concrete', 'gravel', 'sand')[int(rng.integers(5))]
+    f.fill(block, surface)
+    if surface not in {'gravel', 'sand'}:
+        _bands(f, block)
     inner = block.inset(4.0)
     x, y = inner.middle
     if rng.random() < 0.5:
@@ -193,6 +196,20 @@ def square(f: Furnisher, block: Block) -> None:
         f.garden_furniture(*f.point(inner))
     for _ in range(int(rng.poisson(1.2))):
         f.shed(*f.point(inner), 0.0)
+
+
+def _bands(f: Furnisher, block: Block) -> None:
+    """Lay bands of other stones over a paved square: what tells it from soil from high up."""
+    rng = f.rng
+    stones = f.material(('paving', 'red_paving', 'concrete', 'new_asphalt')[int(rng.integers(4))])
+    wide, apart = float(rng.uniform(0.3, 0.9)), float(rng.uniform(3.5, 9.0))
+    f.plan.rectangle(block.x0, block.y0, block.x1, block.y0 + wide, stones)
+    f.plan.rectangle(block.x0, block.y1 - wide, block.x1, block.y1, stones)
+    for x in np.arange(block.x0, block.x1, apart):
+        f.plan.rectangle(float(x), block.y0, float(x) + wide, block.y1, stones)
+    if rng.random() < 0.6:
+        for y in np.arange(block.y0 + apart, block.y1 - wide, apart):
+            f.plan.rectangle(block.x0, float(y), block.x1, float(y) + wide, stones)
 
 
 def parking(f: Furnisher, block: Block) -> None:

@@ -53,7 +53,7 @@ _KINDS: dict[str, tuple[float, float]] = {
     # kind of paved ground: chance of slabs with joints (else repaired patches), of cracks
     'asphalt': (0.0, 0.4), 'new_asphalt': (0.0, 0.05), 'old_asphalt': (0.1, 0.8),
     'concrete': (0.85, 0.5), 'paving': (0.95, 0.1), 'red_paving': (0.95, 0.1),
-    'court': (0.0, 0.1), 'green_court': (0.0, 0.1),
+    'court': (0.0, 0.1), 'green_court': (0.0, 0.1), 'blue_court': (0.0, 0.1),
 }  # fmt: skip
 _SMALL_STONES = ('paving', 'red_paving')
 
@@ -75,13 +75,13 @@ def draw_grain(rng: np.random.Generator, kind: str, label: Label) -> Grain:
     cracks = 0.16 * strength if rng.random() < cracked else 0.0
     if rng.random() >= slabs:
         size = float(rng.uniform(6.0, 25.0)), float(rng.uniform(2.5, 5.0))
-        return Grain(cracks=cracks, slab_m=size, slab=0.06 * strength, joint=0.12,
+        return Grain(cracks=cracks, slab_m=size, slab=0.08 * strength, joint=0.12,
                      joint_m=0.04, angle_rad=angle)  # fmt: skip
     small = kind in _SMALL_STONES
     length = float(rng.uniform(0.3, 1.2) if small else rng.uniform(2.0, 6.0))
     size = length, length * float(rng.uniform(0.5, 1.0))
     wide = float(rng.uniform(0.02, 0.04) if small else rng.uniform(0.03, 0.09))
-    return Grain(cracks=cracks, slab_m=size, slab=(0.09 if small else 0.05) * strength,
+    return Grain(cracks=cracks, slab_m=size, slab=0.09 * strength,
                  joint=0.42 * strength, joint_m=wide, angle_rad=angle)  # fmt: skip
 
 

@@ -143,7 +143,13 @@ def sports(f: Furnisher, block: Block) -> None:
     half_x, half_y = (length / 2, width / 2) if long_x else (width / 2, length / 2)
     angle = f.plan.warp.angle_rad + (0.0 if long_x else pi / 2)
     if court:
-        material = f.material(('court', 'green_court')[int(rng.integers(2))])
+        colours = ('court', 'green_court', 'blue_court', 'old_asphalt', 'asphalt')
+        rim = f.material(colours[int(rng.integers(len(colours)))])
+        margin = float(rng.uniform(1.5, 4.0))
+        f.plan.rectangle(
+            x - half_x - margin, y - half_y - margin, x + half_x + margin, y + half_y + margin, rim
+        )
+        material = f.material(colours[int(rng.integers(len(colours)))])
     else:
         kind = 'turf' if rng.random() < 0.2 else 'pitch'
         material = f.palette.material(kind, float(rng.uniform(8, 14)), angle, 0.07)
@@ -156,10 +162,18 @@ def sports(f: Furnisher, block: Block) -> None:
         if not court:
             bx, by = (0.0, 3.6) if long_x else (3.6, 0.0)
             f.plan.barrier(gx - bx, gy - by, gx + bx, gy + by, 0.14, 2.2, (235, 235, 235))
-    if long_x:
-        f.plan.marking(x - 0.06, y - half_y + 0.6, x + 0.06, y + half_y - 0.6)
-    else:
-        f.plan.marking(x - half_x + 0.6, y - 0.06, x + half_x - 0.6, y + 0.06)
+    # The middle line; on a court the service lines and the line between them as well.
+    for part in (-0.27, 0.0, 0.27) if court else (0.0,):
+        if long_x:
+            at = x + part * length
+            f.plan.marking(at - 0.06, y - half_y + 0.6, at + 0.06, y + half_y - 0.6)
+        else:
+            at = y + part * length
+            f.plan.marking(x - half_x + 0.6, at - 0.06, x + half_x - 0.6, at + 0.06)
+    if court and long_x:
+        f.plan.marking(x - 0.27 * length, y - 0.06, x + 0.27 * length, y + 0.06)
+    elif court:
+        f.plan.marking(x - 0.06, y - 0.27 * length, x + 0.06, y + 0.27 * length)
     f.people(Block(x - half_x, y - half_y, x + half_x, y + half_y), 50.0)
     spacing = float(rng.uniform(7.0, 14.0))
     for t in np.arange(block.x0 + 5, block.x1, spacing):

@@ -142,6 +142,8 @@ def _flat(
             shade = shade + np.where(v > 0, 0.07, -0.05)
         else:
             shade = shade + 0.22 * (np.mod(u, period) / period - 0.5)
+    else:
+        shade = shade + _covering(canvas, region, u if rng.random() < 0.5 else v, rng)
     colour = np.asarray(building.rgb, np.float32) * shade[..., None]
     if building.roof == 'flat':
         rim = (inside < 0.45) & (inside > -g)
@@ -151,6 +153,28 @@ def _flat(
         colour[inner_line] *= 0.86
     _roof_things(colour, height, building, (u, v), rng)
     return np.asarray(colour, np.float32), np.asarray(height, np.float32)
+
+
+def _covering(
+    canvas: Canvas, region: tuple[slice, slice], across: Array, rng: np.random.Generator
+) -> FloatImage:
+    """Return the relative brightness of what covers a flat roof: strips of membrane, or ballast.
+
+    Membrane comes in strips of a metre or two with seams between them; gravel ballast has
+    walkways of slabs. Without them a roof that fills the picture would be no different from soil.
+    """
+    g = canvas.window.gsd_m
+    if rng.random() < 0.8:
+        period, wide, tone = float(rng.uniform(1.0, 2.2)), 0.08, float(rng.uniform(-0.35, -0.12))
+        strips = np.floor(across / period)
+        differ = np.sin(strips * 127.1) * np.clip(2.0 - 2.5 * g / period, 0.0, 1.0)
+        out = 0.025 * differ
+    else:
+        period, wide, tone = float(rng.uniform(6.0, 11.0)), 0.6, float(rng.uniform(0.1, 0.25))
+        out = 0.06 * canvas.noise.octave(-3, 1)[region]
+    to_line = np.abs(across / period - np.round(across / period)) * period
+    filled = np.clip((0.5 * (wide + g) - to_line) / g, 0.0, 1.0) * min(1.0, wide / g)
+    return np.asarray(out + tone * filled, np.float32)
 
 
 def _roof_things(
