@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from peace_ros.training import options
 from peace_ros.training.recipe import Recipe, run
 from peace_ros.training.screen import show
 
@@ -17,23 +18,17 @@ from peace_ros.training.screen import show
 def main(
     out: Annotated[Path, typer.Option(help='Folder that gets clip-small and clipseg-small.')],
     minutes: Annotated[float, typer.Option(help='Minutes of training of both together.')] = 85.0,
-    steps: Annotated[
-        int | None, typer.Option(help='Steps of each network in place of minutes; repeatable.')
-    ] = None,
-    seed: Annotated[int, typer.Option(help='Seed of scenes, views and weights.')] = 0,
-    real: Annotated[
-        Path | None, typer.Option(help='Folder of real aerial images with manifest.csv.')
-    ] = None,
-    work: Annotated[
-        Path, typer.Option(help='Folder of scenes, checkpoints and curves; continues from it.')
-    ] = Path('training_run'),
-    scenes: Annotated[int, typer.Option(help='Number of drawn scenes.')] = 2000,
+    steps: options.Steps = None,
+    seed: options.Seed = 0,
+    real: options.Real = None,
+    work: options.Work = Path('training_run'),
+    scenes: options.Scenes = 2000,
     start: Annotated[
         Path | None,
         typer.Option(help='clipseg-small of an earlier training to go on from, not from ImageNet.'),
     ] = None,
     ranker: Annotated[bool, typer.Option(help='Train clip-small too.')] = True,
-    threads: Annotated[int, typer.Option(help='CPU threads.')] = 2,
+    threads: options.Threads = 2,
 ) -> None:
     """Train the bundled models and write their bundles."""
     recipe = Recipe(

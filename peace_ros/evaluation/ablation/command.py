@@ -16,7 +16,7 @@ from peace_ros.evaluation.ablation.figures import ablation_figures
 from peace_ros.evaluation.ablation.run import ablate as run_ablation
 from peace_ros.evaluation.ablation.table import markdown, put_into
 from peace_ros.evaluation.ablation.variants import default_variants
-from peace_ros.evaluation.segmentation.classes import MIXED, dataset_names
+from peace_ros.evaluation.segmentation import options
 from peace_ros.evaluation.segmentation.cores import Overrides, build_cores
 from peace_ros.evaluation.segmentation.errors import DatasetError
 from peace_ros.evaluation.segmentation.inputs import Inputs, open_source
@@ -29,42 +29,19 @@ def ablate(
     config: Annotated[
         str, typer.Option(metavar='PRESET', help='Preset or file of the family clipseg.')
     ] = 'peace_cs',
-    dataset: Annotated[
-        str, typer.Option(metavar='NAME', help=f'One of {", ".join(dataset_names())}.')
-    ] = '',
-    root: Annotated[
-        Path | None, typer.Option(metavar='DIR', help='Where the dataset was unpacked.')
-    ] = None,
-    images: Annotated[
-        Path | None, typer.Option(metavar='DIR', help='Folder of images; needs --labels.')
-    ] = None,
-    labels: Annotated[
-        Path | None, typer.Option(metavar='DIR', help='Folder of label PNGs, same stems.')
-    ] = None,
-    manifest: Annotated[
-        Path | None, typer.Option(metavar='FILE', help='CSV with columns image, label, split.')
-    ] = None,
-    drawn: Annotated[int, typer.Option(metavar='N', min=0, help='Draw N scenes.')] = 0,
-    drawn_seed: Annotated[
-        int | None, typer.Option(metavar='SEED', min=0, help='First seed of the drawn scenes.')
-    ] = None,
-    classes: Annotated[
-        str, typer.Option(metavar='NAME|FILE', help='Class table of --labels and --manifest.')
-    ] = 'common',
-    split: Annotated[str, typer.Option(help='Only this split of the dataset or manifest.')] = '',
-    mixed: Annotated[
-        str, typer.Option(help=f'Classes of safe and unsafe ground alike: {", ".join(MIXED)}.')
-    ] = 'ignore',
-    limit: Annotated[
-        int | None, typer.Option(metavar='N', min=1, help='At most N images, evenly spread.')
-    ] = None,
-    tile_px: Annotated[
-        int | None,
-        typer.Option(metavar='N', min=16, help='Side of the squares; default the shorter side.'),
-    ] = None,
-    whole: Annotated[
-        bool, typer.Option('--whole', help='Whole frames, stretched as the node does it.')
-    ] = False,
+    dataset: options.DatasetName = '',
+    root: options.Root = None,
+    images: options.Images = None,
+    labels: options.Labels = None,
+    manifest: options.Manifest = None,
+    drawn: options.Drawn = 0,
+    drawn_seed: options.DrawnSeed = None,
+    classes: options.ClassTable = 'common',
+    split: options.Split = '',
+    mixed: options.Mixed = 'ignore',
+    limit: options.Limit = None,
+    tile_px: options.TilePx = None,
+    whole: options.Whole = False,
     most_words: Annotated[
         int, typer.Option(metavar='K', min=1, max=10, help='Environment words, 0 to K.')
     ] = 3,
@@ -72,19 +49,15 @@ def ablate(
         list[str] | None,
         typer.Option(metavar='SENTENCE', help='A further template, with {term}; several allowed.'),
     ] = None,
-    terms: Annotated[str, typer.Option(metavar='FILE', help='Terms in place of the preset.')] = '',
+    terms: options.TermsFile = '',
     vocabularies: Annotated[
         str, typer.Option(metavar='FILE', help='Vocabularies in place of the preset.')
     ] = '',
-    clip: Annotated[str, typer.Option(metavar='BUNDLE', help='CLIP that ranks words.')] = '',
-    clipseg: Annotated[str, typer.Option(metavar='BUNDLE', help='CLIPSeg to use.')] = '',
-    threads: Annotated[int, typer.Option(min=1, max=64, help='CPU threads.')] = 2,
-    strict: Annotated[
-        bool, typer.Option('--strict', help='Refuse at the first image that cannot be scored.')
-    ] = False,
-    json_file: Annotated[
-        Path | None, typer.Option('--json', metavar='FILE', help='Write the figures here.')
-    ] = None,
+    clip: options.ClipBundle = '',
+    clipseg: options.ClipSegBundle = '',
+    threads: options.Threads = 2,
+    strict: options.Strict = False,
+    json_file: options.JsonFile = None,
     table: Annotated[
         Path | None, typer.Option(metavar='FILE', help='Write the Markdown tables here.')
     ] = None,

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from peace_ros.evaluation.segmentation.classes import MIXED, dataset_names
+from peace_ros.evaluation.segmentation import options
 from peace_ros.evaluation.segmentation.cores import Cores, Overrides, build_cores
 from peace_ros.evaluation.segmentation.errors import DatasetError
 from peace_ros.evaluation.segmentation.figures import Figures, figures_of, together
@@ -47,45 +47,19 @@ def evaluate(
             help=f'Preset or file, several allowed; all: {", ".join(ALL_CONFIGS)}.',
         ),
     ] = None,
-    dataset: Annotated[
-        str,
-        typer.Option(metavar='NAME', help=f'One of {", ".join(dataset_names())}; needs --root.'),
-    ] = '',
-    root: Annotated[
-        Path | None, typer.Option(metavar='DIR', help='Where the dataset was unpacked.')
-    ] = None,
-    images: Annotated[
-        Path | None, typer.Option(metavar='DIR', help='Folder of images; needs --labels.')
-    ] = None,
-    labels: Annotated[
-        Path | None, typer.Option(metavar='DIR', help='Folder of label PNGs, same stems.')
-    ] = None,
-    manifest: Annotated[
-        Path | None, typer.Option(metavar='FILE', help='CSV with columns image, label, split.')
-    ] = None,
-    drawn: Annotated[int, typer.Option(metavar='N', min=0, help='Draw N scenes.')] = 0,
-    drawn_seed: Annotated[
-        int | None, typer.Option(metavar='SEED', min=0, help='First seed of the drawn scenes.')
-    ] = None,
-    classes: Annotated[
-        str,
-        typer.Option(metavar='NAME|FILE', help='Class table of --labels and --manifest.'),
-    ] = 'common',
-    split: Annotated[str, typer.Option(help='Only this split of the dataset or manifest.')] = '',
-    mixed: Annotated[
-        str,
-        typer.Option(help=f'Classes of safe and unsafe ground alike: {", ".join(MIXED)}.'),
-    ] = 'ignore',
-    limit: Annotated[
-        int | None, typer.Option(metavar='N', min=1, help='At most N images, evenly spread.')
-    ] = None,
-    tile_px: Annotated[
-        int | None,
-        typer.Option(metavar='N', min=16, help='Side of the squares; default the shorter side.'),
-    ] = None,
-    whole: Annotated[
-        bool, typer.Option('--whole', help='Whole frames, stretched as the node does it.')
-    ] = False,
+    dataset: options.DatasetName = '',
+    root: options.Root = None,
+    images: options.Images = None,
+    labels: options.Labels = None,
+    manifest: options.Manifest = None,
+    drawn: options.Drawn = 0,
+    drawn_seed: options.DrawnSeed = None,
+    classes: options.ClassTable = 'common',
+    split: options.Split = '',
+    mixed: options.Mixed = 'ignore',
+    limit: options.Limit = None,
+    tile_px: options.TilePx = None,
+    whole: options.Whole = False,
     threshold: Annotated[
         float | None,
         typer.Option(metavar='SCORE', help="The network's score; default: the bundle's own."),
@@ -93,17 +67,15 @@ def evaluate(
     fusion: Annotated[
         str, typer.Option(help=f'In place of the presets: {", ".join(FUSIONS)}.')
     ] = '',
-    terms: Annotated[str, typer.Option(metavar='FILE', help='Terms in place of the presets.')] = '',
-    clip: Annotated[str, typer.Option(metavar='BUNDLE', help='CLIP that ranks words.')] = '',
-    clipseg: Annotated[str, typer.Option(metavar='BUNDLE', help='CLIPSeg of *_cs.')] = '',
+    terms: options.TermsFile = '',
+    clip: options.ClipBundle = '',
+    clipseg: options.ClipSegBundle = '',
     fastsam: Annotated[str, typer.Option(metavar='BUNDLE', help='FastSAM of *_fs.')] = '',
-    threads: Annotated[int, typer.Option(min=1, max=64, help='CPU threads.')] = 2,
+    threads: options.Threads = 2,
     no_terms: Annotated[
         bool, typer.Option('--no-terms', help='Do not score each term by itself.')
     ] = False,
-    strict: Annotated[
-        bool, typer.Option('--strict', help='Refuse at the first image that cannot be scored.')
-    ] = False,
+    strict: options.Strict = False,
     max_false_safe: Annotated[
         float | None,
         typer.Option(metavar='SHARE', min=0.0, max=1.0, help='Choose a threshold that keeps it.'),
@@ -115,9 +87,7 @@ def evaluate(
     save: Annotated[
         bool, typer.Option('--save', help='Write the chosen threshold into the bundle.')
     ] = False,
-    json_file: Annotated[
-        Path | None, typer.Option('--json', metavar='FILE', help='Write the figures here.')
-    ] = None,
+    json_file: options.JsonFile = None,
     html: Annotated[
         Path | None, typer.Option(metavar='DIR', help='Write report.html with pictures here.')
     ] = None,

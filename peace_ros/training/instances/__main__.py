@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from peace_ros.training import options
 from peace_ros.training.instances.recipe import Recipe, run
 from peace_ros.training.screen import show
 
@@ -17,22 +18,16 @@ from peace_ros.training.screen import show
 def main(
     out: Annotated[Path, typer.Option(help='Folder that gets fastsam-small.')],
     minutes: Annotated[float, typer.Option(help='Minutes of training of both networks.')] = 20.0,
-    steps: Annotated[
-        int | None, typer.Option(help='Steps of each network in place of minutes; repeatable.')
-    ] = None,
-    seed: Annotated[int, typer.Option(help='Seed of scenes, views and weights.')] = 0,
-    real: Annotated[
-        Path | None, typer.Option(help='Folder of real aerial images with manifest.csv.')
-    ] = None,
-    work: Annotated[
-        Path, typer.Option(help='Folder of scenes, checkpoints and curves; continues from it.')
-    ] = Path('training_run'),
+    steps: options.Steps = None,
+    seed: options.Seed = 0,
+    real: options.Real = None,
+    work: options.Work = Path('training_run'),
     start: Annotated[
         Path | None,
         typer.Option(help='segmenter.pt of peace_ros.training: its backbone knows aerial images.'),
     ] = None,
-    scenes: Annotated[int, typer.Option(help='Number of drawn scenes.')] = 600,
-    threads: Annotated[int, typer.Option(help='CPU threads.')] = 2,
+    scenes: options.Scenes = 600,
+    threads: options.Threads = 2,
 ) -> None:
     """Train the bundled FastSAM-like model and write its bundle."""
     recipe = Recipe(
