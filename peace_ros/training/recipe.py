@@ -17,7 +17,7 @@ from peace_ros.training import ranker, segmenter
 from peace_ros.training.export import export_ranker, export_segmenter, with_weights
 from peace_ros.training.loop import Budget, train
 from peace_ros.training.measure import SafetyModel, choose_threshold, drawn_examples
-from peace_ros.training.sources import SCENE_PX, load_drawn, load_real
+from peace_ros.training.sources import SCENE_PX, credits_of, load_drawn, load_real
 from peace_ros.training.start import start_from
 
 if TYPE_CHECKING:
@@ -150,7 +150,6 @@ def _threshold(recipe: Recipe, model: Segmenter) -> float:
 
 
 def _provenance(recipe: Recipe, sources: list[Source]) -> str:
-    real = sum(source.kind != 'drawn' for source in sources)
     length = f'{recipe.steps} steps' if recipe.steps else f'{recipe.minutes:g} minutes on two cores'
     if recipe.start is None:
         begin = (
@@ -163,7 +162,4 @@ def _provenance(recipe: Recipe, sources: list[Source]) -> str:
         f'{begin} (torch {torch.__version__}, seed '
         f'{recipe.seed}, {length}) on {recipe.scenes} scenes drawn by peace_ros'
     )
-    if real:
-        origins = sorted({source.origin for source in sources if source.origin})
-        text += f' and {real} real images: {", ".join(origins)}'
-    return text + '.'
+    return text + credits_of(sources) + '.'

@@ -148,6 +148,14 @@ def load_real(folder: Path | None) -> list[Source]:
     return load_dubai(folder, 'train') + load_drone(folder)
 
 
+def credits_of(sources: list[Source]) -> str:
+    """Return `` and N real images: `` with their publishers and licences; empty without any."""
+    real = [source for source in sources if source.kind != 'drawn']
+    if not real:
+        return ''
+    return f' and {len(real)} real images: {", ".join(sorted({each.origin for each in real}))}'
+
+
 def _cached_scene(job: tuple[str, int, int]) -> None:
     path, seed, size_px = job
     cv2.setNumThreads(1)

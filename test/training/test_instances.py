@@ -353,10 +353,25 @@ def test_a_start_is_kept_as_it_is(tmp_path: Path) -> None:
     assert network.box_tower.training
 
 
-def test_the_threshold_keeps_persons_out_before_it_raises_miou() -> None:
-    def row(threshold: float, miou: float, persons: float) -> Row:
-        return Row(threshold, miou, 0.5, 0.1, {'PERSON': persons})
+def test_the_pair_starts_from_what_a_segmenter_has_seen_and_goes_on_learning(
+    tmp_path: Path,
+) -> None:
+    given = create_network(0).trunk.backbone.state_dict()
+    changed = {f'encoder.backbone.{key}': value + 1 for key, value in given.items()}
+    torch.save({'average': changed}, tmp_path / 'segmenter.pt')
+    matcher = create_matcher(0, tmp_path / 'segmenter.pt')
+    for key, value in matcher.image.backbone.state_dict().items():
+        assert torch.equal(value, given[key] + 1)
+    assert all(each.requires_grad for each in matcher.image.backbone.parameters())
 
-    rows = (row(0.4, 0.8, 0.02), row(0.5, 0.7, 0.004), row(0.6, 0.6, 0.0))
-    assert best_row(Report(rows, 1.0, 9.0, 0.38)).threshold == 0.5
-    assert best_row(Report(rows[:1], 1.0, 9.0, 0.38)).threshold == 0.4
+
+def test_the_threshold_keeps_hazards_out_before_it_raises_miou() -> None:
+    def row(threshold: float, miou: float, persons: float, false_safe: float) -> Row:
+        return Row(threshold, miou, 0.5, false_safe, {'PERSON': persons})
+
+    people = (row(0.4, 0.8, 0.19, 0.01), row(0.5, 0.7, 0.09, 0.01), row(0.6, 0.6, 0.0, 0.01))
+    assert best_row(Report(people, 1.0, 9.0, 0.38)).threshold == 0.5
+    assert best_row(Report(people[:1], 1.0, 9.0, 0.38)).threshold == 0.4
+    ground = (row(0.4, 0.8, 0.0, 0.09), row(0.5, 0.7, 0.0, 0.07), row(0.6, 0.6, 0.0, 0.04))
+    assert best_row(Report(ground, 1.0, 9.0, 0.38)).threshold == 0.6
+    assert best_row(Report(ground[:2], 1.0, 9.0, 0.38)).threshold == 0.5

@@ -178,7 +178,9 @@ class MatchLoss:
     def __call__(self, model: nn.Module, batch: CropBatch) -> dict[str, Tensor]:
         """Score all segments of the batch against both sets of prompts."""
         matcher = cast('Matcher', model)
-        image = matcher.image(batch.pixels)
+        with torch.autocast('cpu', dtype=torch.bfloat16):
+            maps = matcher.image.backbone(batch.pixels)
+        image = matcher.image.describe(batch.pixels, [level.float() for level in maps.values()])
         template = TEMPLATES[int(self._rng.integers(len(TEMPLATES)))]
         slots = {'resolution': 'rendered', 'frame': 'view', 'environment': 'summer'}
         encoded = self._tokenizer.encode_batch(

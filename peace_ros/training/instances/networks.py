@@ -9,7 +9,7 @@ in FastSAM.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import torch
 from torch import Tensor, nn
@@ -17,6 +17,9 @@ from torch.nn import functional
 
 from peace_ros.training.backbone import CHANNELS, Backbone
 from peace_ros.training.networks import CLASS_COUNT, EMBEDDING_WIDTH, ConvBn, TextTower
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 INPUT_PX = 320
 CROP_PX = 64
@@ -28,6 +31,8 @@ CELL_PX = 4
 _NECK = 64
 _DEEP = 96
 _MOST_LOG_SIZE = 4.0
+_CROPS_DEEPEST = 16
+"""Stride of the deepest map of a segment: 4 x 4 cells of it."""
 _FROZEN_STAGES = 2
 """Of the backbone: what ImageNet taught about edges and colours needs no change."""
 
@@ -175,32 +180,33 @@ class InstanceNetwork(nn.Module):
 class CropEncoder(nn.Module):
     """Cut-out segments [B, 3, 64, 64], zero around them -> embeddings [B, D] of unit length.
 
-    Means, spreads and maxima are taken over the segment alone, beside its own colours and shape.
+    A backbone that knows the ground from above looks at them. Means, spreads and maxima of its
+    maps are taken over the segment alone, beside its own colours and shape.
     """
 
     def __init__(self, width: int = EMBEDDING_WIDTH) -> None:
         super().__init__()
-        self.layers = nn.ModuleList(
-            [
-                ConvBn(3, 20, stride=2),
-                nn.Sequential(ConvBn(20, 40, stride=2), Residual(40)),
-                nn.Sequential(ConvBn(40, 64, stride=2), Residual(64)),
-            ]
-        )
-        statistics = 6 + 1 + 2 * (20 + 40 + 64) + 64
+        self.backbone = Backbone(deepest=_CROPS_DEEPEST)
+        channels = sum(CHANNELS[stride] for stride in self.backbone.strides)
+        statistics = 6 + 1 + 2 * channels + CHANNELS[_CROPS_DEEPEST]
         self.norm = nn.BatchNorm1d(statistics)
-        self.head = nn.Sequential(nn.Linear(statistics, 96), nn.ReLU(), nn.Linear(96, width))
+        self.head = nn.Sequential(
+            nn.Linear(statistics, 128), nn.ReLU(), nn.Dropout(0.1), nn.Linear(128, width)
+        )
 
     def forward(self, pixels: Tensor) -> Tensor:
         """Embed segments, at least one pixel each."""
+        return self.describe(pixels, self.backbone(pixels).values())
+
+    def describe(self, pixels: Tensor, maps: Iterable[Tensor]) -> Tensor:
+        """Embed segments whose maps of the backbone, finest first, are known."""
         shown = (pixels.abs().sum(dim=1, keepdim=True) > 0.0).to(pixels.dtype)
         parts = [*_moments(pixels, shown), shown.mean(dim=(2, 3))]
-        x = pixels
-        for layer in self.layers:
-            x = layer(x)
+        for x in maps:
             shown = functional.max_pool2d(shown, 2)
             parts += _moments(x, shown)
-        parts.append((x * shown).amax(dim=(2, 3)))
+        # What shows in one place only: a car in a yard.
+        parts.append((x - 1e4 * (1.0 - shown)).amax(dim=(2, 3)))
         out = self.head(self.norm(torch.cat(parts, dim=1)))
         return cast('Tensor', out / (out.square().sum(dim=1, keepdim=True) + 1e-8).sqrt())
 

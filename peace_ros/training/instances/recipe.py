@@ -24,10 +24,11 @@ from peace_ros.training.instances.measure import (
     best_row,
     drawn_frames,
     measure,
+    merit,
 )
 from peace_ros.training.instances.networks import INPUT_PX, InstanceNetwork, Matcher
 from peace_ros.training.loop import Budget, train
-from peace_ros.training.sources import SCENE_PX, load_drawn, load_real
+from peace_ros.training.sources import SCENE_PX, credits_of, load_drawn, load_real
 from peace_ros.training.text import vocabulary
 
 if TYPE_CHECKING:
@@ -38,12 +39,13 @@ if TYPE_CHECKING:
     from peace_ros.training.backbone import Backbone
     from peace_ros.training.sources import Source
 
-_MATCHER_SHARE = 0.3
+_MATCHER_SHARE = 0.4
 """Of the minutes; the segmenter gets the rest."""
 _SEGMENTER_RATE = 2e-3
 _MATCHER_RATE = 3e-3
 _PRETRAINED = ('trunk.backbone.', 0.25)
-"""What was learned on ImageNet is changed with care: at this part of the rate."""
+_PRETRAINED_CROPS = ('image.backbone.', 0.25)
+"""What is known already is changed with care: at this part of the rate."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ class Recipe:
     batch_size: int = 6
     views_of_crops: int = 6
     side_px: int = INPUT_PX
-    shifts: tuple[float, ...] = (0.0, 0.8, 1.6, 2.4)
+    shifts: tuple[float, ...] = (0.8, 1.6, 2.4, 3.2, 4.0)
     """Of the confidence, in log-odds; the best is chosen with the threshold."""
 
 
@@ -109,13 +111,18 @@ def create_network(seed: int, start: Path | None = None) -> InstanceNetwork:
     """
     torch.manual_seed(seed + 2)
     network = InstanceNetwork()
-    if start is None:
-        load_pretrained(network.trunk.backbone)
-    else:
-        network.trunk.backbone.load_state_dict(_backbone_of(start, network.trunk.backbone))
+    _fill_backbone(network.trunk.backbone, start)
+    if start is not None:
         # It has seen more aerial images than this training will show it.
         network.trunk.freeze(len(network.trunk.backbone.stages))
     return cast('InstanceNetwork', network.to(memory_format=torch.channels_last))  # type: ignore[call-overload]
+
+
+def _fill_backbone(backbone: Backbone, start: Path | None) -> None:
+    if start is None:
+        load_pretrained(backbone)
+    else:
+        backbone.load_state_dict(_backbone_of(start, backbone))
 
 
 def _backbone_of(path: Path, backbone: Backbone) -> dict[str, Tensor]:
@@ -131,10 +138,12 @@ def _backbone_of(path: Path, backbone: Backbone) -> dict[str, Tensor]:
     return found
 
 
-def create_matcher(seed: int) -> Matcher:
-    """Return an untrained pair whose weights follow from the seed."""
+def create_matcher(seed: int, start: Path | None = None) -> Matcher:
+    """Return a pair whose image encoder begins as :func:`create_network`'s backbone does."""
     torch.manual_seed(seed + 3)
-    return Matcher(len(vocabulary()))
+    matcher = Matcher(len(vocabulary()))
+    _fill_backbone(matcher.image.backbone, start)
+    return cast('Matcher', matcher.to(memory_format=torch.channels_last))  # type: ignore[call-overload]
 
 
 def _train_segmenter(
@@ -161,7 +170,7 @@ def _train_segmenter(
 def _train_matcher(
     recipe: Recipe, sources: list[Source], report: Callable[[str, float, str], None]
 ) -> Matcher:
-    matcher = create_matcher(recipe.seed)
+    matcher = create_matcher(recipe.seed, recipe.start)
     maker = CropMaker(
         sources, recipe.seed, views=recipe.views_of_crops, prompts=40, side_px=recipe.side_px
     )
@@ -174,6 +183,7 @@ def _train_matcher(
         folder=recipe.work,
         name='matcher',
         report=lambda progress, line: report('matcher', progress, line),
+        slower=_PRETRAINED_CROPS,
     )
     return cast('Matcher', with_weights(matcher, state))
 
@@ -190,12 +200,11 @@ def _choose(
             candidate = replace(description, shift=shift)
             export_bundle(network, matcher, Path(folder) / NAME, candidate)
             rows[shift] = best_row(measure(Path(folder) / NAME, examples))
-    best = max(rows, key=lambda shift: rows[shift].miou)
+    best = max(rows, key=lambda shift: merit(rows[shift]))
     return replace(description, shift=best, recommended={'threshold': rows[best].threshold})
 
 
 def _provenance(recipe: Recipe, sources: list[Source]) -> str:
-    real = sum(source.kind != 'drawn' for source in sources)
     length = f'{recipe.steps} steps' if recipe.steps else f'{recipe.minutes:g} minutes'
     start = ', fine-tuned in clipseg-small,' if recipe.start else ''
     text = (
@@ -203,11 +212,4 @@ def _provenance(recipe: Recipe, sources: list[Source]) -> str:
         f'ImageNet){start} in the segmenter (torch {torch.__version__}, seed {recipe.seed}, '
         f'{length}) on {recipe.scenes} scenes drawn by peace_ros'
     )
-    if real:
-        text += (
-            f' and {real} real images: Semantic segmentation of aerial imagery (CC0, Humans in '
-            'the Loop with MBRSC), odm_data_caliterra (CC0, Dennis Baldwin), '
-            'drone_dataset_brighton_beach (BSD-2-Clause, Piero Toffanin), odm_boruszyn_kap '
-            '(CC-BY 3.0, Andrew Zaborowski / OpenStreetMap-PL)'
-        )
-    return text + '.'
+    return text + credits_of(sources) + '.'
