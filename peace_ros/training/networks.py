@@ -28,12 +28,12 @@ class ConvBn(nn.Sequential):
     """Convolution, batch norm and optionally ReLU; folds into one convolution at export."""
 
     def __init__(
-        self, inputs: int, outputs: int, *, kernel: int = 3, stride: int = 1, dilation: int = 1,
+        self, inputs: int, outputs: int, *, kernel: int = 3, stride: int = 1,
         relu: bool = True,
     ) -> None:  # fmt: skip
-        padding = dilation * (kernel // 2)
+        padding = kernel // 2
         layers: list[nn.Module] = [
-            nn.Conv2d(inputs, outputs, kernel, stride, padding, dilation, bias=False),
+            nn.Conv2d(inputs, outputs, kernel, stride, padding, bias=False),
             nn.BatchNorm2d(outputs),
         ]
         if relu:
@@ -44,9 +44,9 @@ class ConvBn(nn.Sequential):
 class Residual(nn.Module):
     """Two 3 x 3 convolutions around a skip."""
 
-    def __init__(self, channels: int, dilation: int = 1) -> None:
+    def __init__(self, channels: int) -> None:
         super().__init__()
-        self.first = ConvBn(channels, channels, dilation=dilation)
+        self.first = ConvBn(channels, channels)
         self.second = ConvBn(channels, channels, relu=False)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -80,12 +80,13 @@ class ImageEncoder(nn.Module):
         at = self.backbone(pixels)
         context = self.context(at[32].mean(dim=(2, 3)))
         x = self.lateral32(at[32]) + context[:, :, None, None]
-        x = self.smooth16(self.lateral16(at[16]) + _double(x))
-        x = self.smooth8(self.lateral8(at[8]) + _double(x))
-        return cast('Tensor', self.smooth4(self.lateral4(at[4]) + self.fold2(at[2]) + _double(x)))
+        x = self.smooth16(self.lateral16(at[16]) + double(x))
+        x = self.smooth8(self.lateral8(at[8]) + double(x))
+        return cast('Tensor', self.smooth4(self.lateral4(at[4]) + self.fold2(at[2]) + double(x)))
 
 
-def _double(x: Tensor) -> Tensor:
+def double(x: Tensor) -> Tensor:
+    """Grow maps [B, C, h, w] to twice the height and width."""
     return functional.interpolate(x, scale_factor=2.0, mode='bilinear', align_corners=False)
 
 

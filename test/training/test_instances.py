@@ -341,27 +341,33 @@ def test_a_start_that_is_no_checkpoint_is_refused_in_words(tmp_path: Path) -> No
         create_network(0, file)
 
 
-def test_a_start_is_kept_as_it_is(tmp_path: Path) -> None:
+@pytest.fixture
+def seen(tmp_path: Path) -> tuple[Path, dict[str, torch.Tensor]]:
+    """A segmenter.pt whose backbone is not that of ImageNet, and the weights of this backbone."""
     given = create_network(0).trunk.backbone.state_dict()
-    changed = {f'encoder.backbone.{key}': value + 1 for key, value in given.items()}
-    torch.save({'average': changed}, tmp_path / 'segmenter.pt')
-    network = create_network(0, tmp_path / 'segmenter.pt').train()
+    changed = {key: value + 1 for key, value in given.items()}
+    file = tmp_path / 'segmenter.pt'
+    torch.save({'average': {f'encoder.backbone.{key}': changed[key] for key in changed}}, file)
+    return file, changed
+
+
+def test_a_start_is_kept_as_it_is(seen: tuple[Path, dict[str, torch.Tensor]]) -> None:
+    file, weights = seen
+    network = create_network(0, file).train()
     for key, value in network.trunk.backbone.state_dict().items():
-        assert torch.equal(value, given[key] + 1)
+        assert torch.equal(value, weights[key])
     assert not any(each.requires_grad for each in network.trunk.backbone.parameters())
     assert not network.trunk.backbone.stages[-1].training
     assert network.box_tower.training
 
 
 def test_the_pair_starts_from_what_a_segmenter_has_seen_and_goes_on_learning(
-    tmp_path: Path,
+    seen: tuple[Path, dict[str, torch.Tensor]],
 ) -> None:
-    given = create_network(0).trunk.backbone.state_dict()
-    changed = {f'encoder.backbone.{key}': value + 1 for key, value in given.items()}
-    torch.save({'average': changed}, tmp_path / 'segmenter.pt')
-    matcher = create_matcher(0, tmp_path / 'segmenter.pt')
+    file, weights = seen
+    matcher = create_matcher(0, file)
     for key, value in matcher.image.backbone.state_dict().items():
-        assert torch.equal(value, given[key] + 1)
+        assert torch.equal(value, weights[key])
     assert all(each.requires_grad for each in matcher.image.backbone.parameters())
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from numpy.typing import NDArray
 from peace_ros.domain import Label
 from peace_ros.simulation.drawing.noise import FloatImage, Noise
 from peace_ros.simulation.drawing.window import Window
+
+Array = NDArray[np.floating[Any]]
 
 _TUFTS, _STONES, _CRACKS = 2, 3, 4
 """Variants of the noise, so that no structure follows another or the colour."""
@@ -161,16 +164,21 @@ def _add_oriented(
     along = u / length + 0.5 * (row % 2.0)
     tone = _chance(np.floor(along), row) - 0.5
     shown = np.clip(2.0 - 2.5 * gsd / width, 0.0, 1.0)
-    to_joint = np.minimum(_to_edge(along) * length, _to_edge(v / width) * width)
-    filled = np.clip((0.5 * (grain.joint_m + gsd) - to_joint) / gsd, 0.0, 1.0)
-    filled *= min(1.0, grain.joint_m / gsd)
+    to_joint = np.minimum(to_edge(along) * length, to_edge(v / width) * width)
+    filled = line_share(to_joint, grain.joint_m, gsd)
     worn = np.clip(0.75 + 0.35 * noise.octave(1, _CRACKS)[own], 0.0, 1.3)
     total[own] += (2.0 * grain.slab * shown * tone - grain.joint * filled * worn).astype(np.float32)
 
 
-def _to_edge(cells: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_edge(cells: Array) -> Array:
     """Return the distance to the nearest whole number."""
-    return np.abs(cells - np.round(cells))
+    return np.asarray(np.abs(cells - np.round(cells)))
+
+
+def line_share(to_line_m: Array, wide_m: float, gsd_m: float) -> Array:
+    """Return which part of each pixel a line covers, 0 to 1, by the distance to its middle."""
+    filled = np.clip((0.5 * (wide_m + gsd_m) - to_line_m) / gsd_m, 0.0, 1.0)
+    return np.asarray(filled * min(1.0, wide_m / gsd_m))
 
 
 def _chance(i: NDArray[np.float64], j: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,18 +5,15 @@
 from __future__ import annotations
 
 from math import cos, sin
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from peace_ros.domain import Label
 from peace_ros.simulation.drawing.canvas import Canvas
+from peace_ros.simulation.drawing.grain import Array, line_share, to_edge
 from peace_ros.simulation.drawing.light import Sun
 from peace_ros.simulation.drawing.noise import FloatImage
 from peace_ros.simulation.drawing.plan import Building
-
-Array = NDArray[np.floating[Any]]
 
 PITCHED = ('gable', 'hip')
 
@@ -172,9 +169,8 @@ def _covering(
     else:
         period, wide, tone = float(rng.uniform(6.0, 11.0)), 0.6, float(rng.uniform(0.1, 0.25))
         out = 0.06 * canvas.noise.octave(-3, 1)[region]
-    to_line = np.abs(across / period - np.round(across / period)) * period
-    filled = np.clip((0.5 * (wide + g) - to_line) / g, 0.0, 1.0) * min(1.0, wide / g)
-    return np.asarray(out + tone * filled, np.float32)
+    line = line_share(to_edge(across / period) * period, wide, g)
+    return np.asarray(out + tone * line, np.float32)
 
 
 def _roof_things(

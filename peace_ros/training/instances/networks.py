@@ -16,7 +16,14 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from peace_ros.training.backbone import CHANNELS, Backbone
-from peace_ros.training.networks import CLASS_COUNT, EMBEDDING_WIDTH, ConvBn, TextTower
+from peace_ros.training.networks import (
+    CLASS_COUNT,
+    EMBEDDING_WIDTH,
+    ConvBn,
+    Residual,
+    TextTower,
+    double,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -84,23 +91,6 @@ def decode_boxes(raw: Tensor, anchors: Tensor) -> Tensor:
     return torch.cat([centres, sizes], dim=-1)
 
 
-def _double(x: Tensor) -> Tensor:
-    return functional.interpolate(x, scale_factor=2.0, mode='bilinear', align_corners=False)
-
-
-class Residual(nn.Module):
-    """Two 3 x 3 convolutions around a skip."""
-
-    def __init__(self, channels: int) -> None:
-        super().__init__()
-        self.first = ConvBn(channels, channels)
-        self.second = ConvBn(channels, channels, relu=False)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Keep the shape."""
-        return functional.relu(x + self.second(self.first(x)))
-
-
 class Trunk(nn.Module):
     """RGB [B, 3, S, S] -> feature maps of 64 channels at the strides 4, 8, 16, 32."""
 
@@ -136,9 +126,9 @@ class Trunk(nn.Module):
         deep = self.deep(maps[16])
         context = self.context(deep.mean(dim=(2, 3)))
         at32 = self.lateral32(functional.relu(deep + context[:, :, None, None]))
-        at16 = self.lateral16(maps[16]) + _double(at32)
-        at8 = self.smooth8(self.lateral8(maps[8]) + _double(at16))
-        at4 = self.smooth4(self.lateral4(maps[4]) + _double(at8))
+        at16 = self.lateral16(maps[16]) + double(at32)
+        at8 = self.smooth8(self.lateral8(maps[8]) + double(at16))
+        at4 = self.smooth4(self.lateral4(maps[4]) + double(at8))
         return at4, at8, at16, at32
 
 
