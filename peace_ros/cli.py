@@ -135,6 +135,13 @@ def demo(
         str | None,
         typer.Option(metavar='URL', help='A second connection to it, which the camera follows.'),
     ] = None,
+    camera_px: Annotated[
+        int,
+        typer.Option(
+            metavar='N',
+            help='Side of the image; from 704 on it is also seen closer, in parts; takes time.',
+        ),
+    ] = 352,
     run_dir: Annotated[
         Path | None,
         typer.Option(metavar='DIR', help='Empty or new folder; default runs/<time>-seed<seed>.'),
@@ -163,6 +170,7 @@ def demo(
         autopilot=autopilot,
         mavlink=mavlink,
         pose_mavlink=pose_mavlink,
+        camera_px=camera_px,
         run_dir=run_dir,
         timeout_s=timeout,
     )

@@ -24,6 +24,8 @@ class Wiring:
     """How the nodes of one run are connected."""
 
     world: DemoWorld
+    camera_px: int
+    """Width and height of the camera's image."""
     preset: Path
     speed: float
     mavlink: str
@@ -53,16 +55,19 @@ def node_arguments(wiring: Wiring) -> Arguments:
             'publish_clock': wiring.use_sim_time,
         }
         arguments['autopilot_sim'] = _ros_arguments(autopilot)
-    arguments['satellite_view'] = _ros_arguments({**clock, **_camera(wiring)})
+    camera = {'camera_width': wiring.camera_px, 'camera_height': wiring.camera_px}
+    arguments['satellite_view'] = _ros_arguments({**clock, **camera, **_view(wiring)})
     arguments['prompt_generator'] = _ros_arguments(clock, wiring.preset)
     arguments['segmentation'] = _ros_arguments(clock, wiring.preset)
-    arguments['landing'] = _ros_arguments({**clock, 'mavlink': wiring.mavlink}, wiring.preset)
+    arguments['landing'] = _ros_arguments(
+        {**clock, **camera, 'mavlink': wiring.mavlink}, wiring.preset
+    )
     return arguments
 
 
-def _camera(wiring: Wiring) -> dict[str, object]:
+def _view(wiring: Wiring) -> dict[str, object]:
     world = wiring.world
-    camera: dict[str, object] = {
+    view: dict[str, object] = {
         'world': str(world.image_file),
         'gsd': float(world.world.gsd_m),
         'labels': '' if world.label_file is None else str(world.label_file),
@@ -71,8 +76,8 @@ def _camera(wiring: Wiring) -> dict[str, object]:
         'rate': CAMERA_HZ / wiring.speed,
     }
     if wiring.pose_mavlink is not None:
-        camera.update(pose_source='mavlink', pose_mavlink=wiring.pose_mavlink)
-    return camera
+        view.update(pose_source='mavlink', pose_mavlink=wiring.pose_mavlink)
+    return view
 
 
 def _ros_arguments(parameters: Mapping[str, object], preset: Path | None = None) -> list[str]:

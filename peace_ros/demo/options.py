@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 
-from peace_ros.domain import ConfigurationError, VehicleError
+from peace_ros.domain import Camera, ConfigurationError, VehicleError
+from peace_ros.nodes.options import CameraOptions
 from peace_ros.recording.run_folder import create_run_folder
 
 DEFAULT_TIMEOUT_S = 330.0
@@ -42,6 +43,8 @@ class DemoOptions:
     """URL of an autopilot that is already there."""
     pose_mavlink: str | None = None
     """URL on which the camera hears the pose of that autopilot."""
+    camera_px: int = CameraOptions().camera_width
+    """Width and height of the camera's image."""
     run_dir: Path | None = None
     """Folder of the results; None: ``runs/<time>-seed<seed>`` where the user stands."""
     timeout_s: float = DEFAULT_TIMEOUT_S
@@ -56,6 +59,8 @@ class DemoOptions:
             )
         if not 10.0 <= self.timeout_s <= 7200.0:
             raise ConfigurationError(f'--timeout {self.timeout_s} s: give 10 to 7200')
+        if not 64 <= self.camera_px <= 4096:
+            raise ConfigurationError(f'--camera-px {self.camera_px}: give 64 to 4096')
         if not 0 <= self.seed < 2**31:
             raise ConfigurationError(f'--seed {self.seed}: give 0 to {2**31 - 1}')
 
@@ -106,6 +111,12 @@ class DemoOptions:
                 f'--speed {self.speed} with --mavlink: the clock of a given autopilot cannot be '
                 'changed; leave --speed out'
             )
+
+    @property
+    def camera(self) -> Camera:
+        """The square camera of the demo."""
+        options = CameraOptions(camera_width=self.camera_px, camera_height=self.camera_px)
+        return options.camera
 
     @property
     def own_autopilot(self) -> bool:

@@ -24,7 +24,6 @@ from peace_ros.demo.summary import Ending, Setting, Summary, Truth, summarise
 from peace_ros.demo.worlds import DemoWorld, prepare_world
 from peace_ros.domain import PeaceError, VehicleError
 from peace_ros.landing import LandingParameters
-from peace_ros.nodes.options import CameraOptions
 from peace_ros.recording import BagWriter
 from peace_ros.replay import Preset, load_preset
 from peace_ros.simulation.camera import NadirCamera
@@ -75,6 +74,7 @@ class _Run:
         port = free_udp_port() if self.options.own_autopilot else None
         self.wiring = Wiring(
             world=self.world,
+            camera_px=self.options.camera_px,
             preset=self.preset.path,
             speed=self.speed,
             mavlink=self.options.mavlink or f'udpout:127.0.0.1:{port}',
@@ -103,7 +103,7 @@ def run_demo(options: DemoOptions, console: Console) -> int:
         domain = isolate(run_dir / 'logs' / 'ros')
         with console.status('preparing the world'):
             world = prepare_world(options, run_dir)
-        truth = Truth(NadirCamera(world.world, CameraOptions().camera), landing.safety_radius_m)
+        truth = Truth(NadirCamera(world.world, options.camera), landing.safety_radius_m)
         console.print(f'world: {world.note}', highlight=False)
         console.print(
             f'start {world.start_east_m:g},{world.start_north_m:g} m east, north of its centre; '
@@ -322,8 +322,7 @@ def _finish(
     monitor: Monitor, summary: Summary, truth: Truth, run_dir: Path, console: Console
 ) -> None:
     summary.write(run_dir / 'summary.json')
-    camera = CameraOptions().camera
     with console.status('drawing the pictures'):
-        draw_pictures(monitor.history, summary, truth, camera, run_dir)
+        draw_pictures(monitor.history, summary, truth, truth.camera.camera, run_dir)
     console.print(headline(summary))
     console.print(summary_table(summary, run_dir))

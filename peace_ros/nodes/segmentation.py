@@ -43,6 +43,8 @@ from peace_ros.segmentation import (
 
 PARAMETERS: tuple[Group, ...] = (('', SegmentationParameters), ('', SegmentationOptions))
 _NAME = 'segmentation'
+_SLOW_S = 1.0
+"""Work for one frame that leaves little of the age that the landing allows a heatmap."""
 
 
 class SegmentationNode(PeaceNode):
@@ -154,6 +156,13 @@ class SegmentationNode(PeaceNode):
                 f'{-age_s:.2f} s after it'
             )
             self.say('prompt', sentence)
+        if work_s > _SLOW_S:
+            level = WARN
+            sentence = (
+                f'a frame takes {work_s:.1f} s, at most {_SLOW_S} s are good: lower '
+                'clipseg_max_looks or the resolution of the camera'
+            )
+            self.say('slow', sentence)
         values = (
             ('latency_s', f'{(self.clock_ns() - at_ns) / 1e9:.3f}'),
             ('work_s', f'{work_s:.3f}'),

@@ -1,10 +1,10 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""CLIPSeg: the image is encoded once per frame and decoded once for all terms together."""
+"""CLIPSeg: the image is encoded once per look and decoded once for all terms together."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,12 @@ from peace_ros.domain import BundleError, ConfigurationError, Frame, Heatmap, Pr
 from peace_ros.inference import Bundle, Preprocessor
 from peace_ros.inference.contract import IS_POSITIVE, PIXEL_VALUES, TERM_LOGITS, TEXT_EMBEDDING
 from peace_ros.segmentation.fusion import calibrated
+from peace_ros.segmentation.looks import joined, parts_of
 from peace_ros.segmentation.segmenter import BundleSegmenter, SegmentationParameters
 from peace_ros.segmentation.terms import Terms
+
+Image = NDArray[np.uint8]
+Scores = NDArray[np.float32]
 
 _ROUNDING = 1e-3
 """How far beyond 0 and 1 a score may lie, from arithmetic in fp16 or int8."""
@@ -61,45 +65,65 @@ class ClipSegSegmenter(BundleSegmenter):
         self._sessions['decoder'].warm_up(self._fusion.outputs, self._feeds(features, texts))
 
     def segment(self, frame: Frame, prompt: Prompt) -> Heatmap:
-        """Return the safety of each pixel at network resolution, with the frame's stamp.
+        """Return the safety of each pixel, with the frame's stamp.
 
-        0.5 is the score from which the bundle recommends to call ground safe.
+        It has the resolution of the network, times the parts that the frame is looked at in. 0.5
+        is the score from which the bundle recommends to call ground safe.
 
         Raises ImageError for an image that cannot be used, BundleError for an answer of the
         network that cannot be used.
         """
-        maps = self._decode(frame, prompt, self._fusion.outputs)
-        safety = self._fusion.combine(*(self._checked(each) for each in maps))
+        texts = self._embeddings(prompt)
+        (safety,) = self._closely(frame, lambda image: self._safety(image, texts))
         return Heatmap(calibrated(safety, self._threshold), frame.stamp_ns)
 
     def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
         """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``."""
-        (logits,) = self._decode(frame, prompt, [TERM_LOGITS])
+        texts = self._embeddings(prompt)
+        maps = self._closely(frame, lambda image: self._chances(image, texts))
+        return np.stack(maps)
+
+    def _closely(self, frame: Frame, see: Callable[[Image], list[Scores]]) -> list[Scores]:
+        """Return the maps that are seen in the frame, each of the whole and of its parts."""
+        image, size = frame.image_rgb, self._manifest.input
+        parts = parts_of(
+            (image.shape[1], image.shape[0]),
+            (size.width, size.height),
+            self._parameters.clipseg_max_looks,
+        )
+        whole = see(image)
+        answers = [see(part.of(image)) for part in parts]
+        return [
+            joined(each, [answer[index] for answer in answers], parts)
+            for index, each in enumerate(whole)
+        ]
+
+    def _safety(self, image_rgb: Image, texts: Scores) -> list[Scores]:
+        maps = self._decode(image_rgb, texts, self._fusion.outputs)
+        return [self._fusion.combine(*(self._checked(each) for each in maps))]
+
+    def _chances(self, image_rgb: Image, texts: Scores) -> list[Scores]:
+        (logits,) = self._decode(image_rgb, texts, [TERM_LOGITS])
         if logits.ndim != 3 or logits.shape[0] != len(self._terms):
             raise self._unusable('decoder', f'{TERM_LOGITS} of shape {logits.shape}')
         if not np.isfinite(logits).all():
             raise self._unusable('decoder', f'{TERM_LOGITS} that are not finite')
         # tanh never overflows, where exp would.
-        maps: NDArray[np.float32] = 0.5 * np.tanh(0.5 * logits) + 0.5
-        return maps
+        maps: Scores = 0.5 * np.tanh(0.5 * logits) + 0.5
+        return list(maps)
 
-    def _decode(
-        self, frame: Frame, prompt: Prompt, outputs: Sequence[str]
-    ) -> list[NDArray[np.float32]]:
-        texts = self._embeddings(prompt)
-        pixels = self._preprocess(frame.image_rgb)
-        features = self._sessions['image_encoder'].run(self._features, {PIXEL_VALUES: pixels})
+    def _decode(self, image_rgb: Image, texts: Scores, outputs: Sequence[str]) -> list[Scores]:
+        feeds = {PIXEL_VALUES: self._preprocess(image_rgb)}
+        features = self._sessions['image_encoder'].run(self._features, feeds)
         return self._sessions['decoder'].run(outputs, self._feeds(features, texts))
 
-    def _feeds(
-        self, features: Sequence[NDArray[np.float32]], texts: NDArray[np.float32]
-    ) -> dict[str, NDArray[np.float32]]:
+    def _feeds(self, features: Sequence[Scores], texts: Scores) -> dict[str, Scores]:
         feeds = dict(zip(self._features, features, strict=True))
         feeds[TEXT_EMBEDDING] = texts
         feeds[IS_POSITIVE] = self._is_positive
         return feeds
 
-    def _checked(self, scores: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _checked(self, scores: Scores) -> Scores:
         """Return scores h x w clipped to 0..1; refuse what is no score at all."""
         if scores.ndim != 2 or scores.size == 0:
             raise self._unusable('decoder', f'scores of shape {scores.shape}')

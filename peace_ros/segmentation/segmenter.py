@@ -46,6 +46,13 @@ class SegmentationParameters:
     cache_dir: str = parameter(
         '', 'Folder that keeps text embeddings for the next start; empty keeps them in memory only'
     )
+    clipseg_max_looks: int = parameter(
+        10,
+        'Family clipseg: a frame of more pixels than the network takes is seen whole and closer in '
+        'parts, in this many looks at most; each takes as long as a small frame. 1: whole only',
+        low=1,
+        high=101,
+    )
     fastsam_max_segments: int = parameter(
         50,
         'Family fastsam: segments that CLIP scores per frame, the largest ones; the ground under '

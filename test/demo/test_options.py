@@ -38,6 +38,7 @@ def photo(tmp_path) -> Path:
         ({'speed': float('nan')}, '--speed'),
         ({'timeout_s': 1.0}, '--timeout'),
         ({'seed': -1}, '--seed'),
+        ({'camera_px': 8}, '--camera-px'),
         ({'mavlink': 'udpin:127.0.0.1:1'}, '--pose-mavlink'),
         ({'pose_mavlink': 'udpin:127.0.0.1:1'}, '--mavlink'),
         ({'mavlink': 'udpin:127.0.0.1:1', 'pose_mavlink': 'udpin:127.0.0.1:1'}, 'second'),
@@ -142,6 +143,7 @@ def wiring(tmp_path, photo, **changes) -> Wiring:
     prepared = prepare_world(DemoOptions(world=photo, gsd_m=0.5, start=(1.0, 2.0)), tmp_path)
     plain = {
         'world': prepared,
+        'camera_px': 704,
         'preset': tmp_path / 'preset.yaml',
         'speed': 2.0,
         'mavlink': 'udpout:127.0.0.1:5',
@@ -160,6 +162,8 @@ def test_with_our_own_autopilot_five_nodes_share_its_clock(tmp_path, photo) -> N
     assert 'speed:=2.0' in arguments['autopilot_sim']
     assert {'start_x:=1.0', 'start_y:=2.0', 'gsd:=0.5'} <= set(arguments['satellite_view'])
     assert "mavlink:='udpout:127.0.0.1:5'" in arguments['landing']
+    for name in ('satellite_view', 'landing'):
+        assert {'camera_width:=704', 'camera_height:=704'} <= set(arguments[name])
     for name in ('prompt_generator', 'segmentation', 'landing'):
         assert str(tmp_path / 'preset.yaml') in arguments[name]
 

@@ -38,8 +38,11 @@ def counted(peace_cs: Cores) -> Counted:
     return ablate(open_source(Inputs(drawn=FRAMES)), peace_cs, default_variants(2))
 
 
-def test_each_image_is_encoded_once_for_all_variants(counted: Counted) -> None:
-    assert counted.image_encodings == FRAMES
+def test_each_look_is_encoded_once_for_all_variants(counted: Counted, peace_cs: Cores) -> None:
+    before = peace_cs.segmenter.calls['image_encoder']
+    evaluate(open_source(Inputs(drawn=FRAMES)), [peace_cs], score_terms=False)
+    looks = peace_cs.segmenter.calls['image_encoder'] - before
+    assert counted.image_encodings == looks > FRAMES
     assert len(counted.counts) == len(default_variants(2)) * len(FUSIONS)
 
 

@@ -14,6 +14,7 @@ from sensor_msgs.msg import CompressedImage, Image
 from peace_ros.domain import Heatmap, Prompt
 from peace_ros.nodes import qos
 from peace_ros.nodes.messages import (
+    WARN,
     frame_from_message,
     heatmap_from_image,
     prompt_to_message,
@@ -108,6 +109,17 @@ def test_a_new_sentence_does_not_stall_the_frames(bench, picture):
         lambda: painter.seen[-1][1].template == 'A {term} in summer.',
         lambda: images.publish(picture(2)),
     )
+
+
+def test_a_frame_that_takes_too_long_is_told_with_the_remedy(bench, picture):
+    diagnostics = bench.heard(DiagnosticArray, '/diagnostics', qos.RESULT)
+    bench.run(SegmentationNode, Painter(seconds=1.1), template='D')
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    bench.until(lambda: bool(diagnostics), lambda: images.publish(picture(5)))
+    status = diagnostics[0].status[0]
+    assert status.level == WARN
+    assert 'a frame takes 1.1 s' in status.message
+    assert 'clipseg_max_looks' in status.message
 
 
 def test_a_slow_segmenter_loses_frames_and_never_gathers_latency(bench, picture, values_of):

@@ -21,7 +21,7 @@ NIGHT = Prompt('A blurred picture of {term} in night.', 0)
 
 
 def make(folder: Path, terms: Terms = TERMS, **changes: Any) -> ClipSegSegmenter:
-    parameters = SegmentationParameters(threads=1, **changes)
+    parameters = SegmentationParameters(threads=1, **{'clipseg_max_looks': 1, **changes})
     return ClipSegSegmenter(Bundle.load(folder), terms, parameters)
 
 
@@ -45,6 +45,17 @@ def test_a_frame_costs_one_encoding_and_one_decoding_whatever_the_terms(
         for _ in range(4):
             segmenter.segment(frame, SPRING)
         assert segmenter.calls == {'image_encoder': 4, 'text_encoder': 1, 'decoder': 4}
+
+
+def test_a_large_frame_costs_one_look_more_than_its_parts(
+    clipseg_folder: Path, frame: Frame
+) -> None:
+    for most, looks, shape in ((10, 10, (24, 30)), (5, 5, (16, 20)), (1, 1, (8, 10))):
+        segmenter = make(clipseg_folder, clipseg_max_looks=most)
+        heatmap = segmenter.segment(frame, SPRING)
+        assert segmenter.calls == {'image_encoder': looks, 'text_encoder': 1, 'decoder': looks}
+        assert heatmap.safety.shape == shape
+        assert segmenter.term_maps(frame, SPRING).shape == (len(TERMS.all), *shape)
 
 
 def test_a_new_prompt_is_embedded_once_and_an_old_one_not_again(

@@ -21,6 +21,7 @@ from peace_ros.evaluation.segmentation.cores import Overrides, build_cores
 from peace_ros.evaluation.segmentation.errors import DatasetError
 from peace_ros.evaluation.segmentation.inputs import Inputs, open_source
 from peace_ros.evaluation.segmentation.progress import over_images
+from peace_ros.evaluation.segmentation.samples import CAMERA_PX
 from peace_ros.evaluation.segmentation.tiles import WHOLE
 
 
@@ -36,12 +37,14 @@ def ablate(
     manifest: options.Manifest = None,
     drawn: options.Drawn = 0,
     drawn_seed: options.DrawnSeed = None,
+    drawn_px: options.DrawnPx = CAMERA_PX,
     classes: options.ClassTable = 'common',
     split: options.Split = '',
     mixed: options.Mixed = 'ignore',
     limit: options.Limit = None,
     tile_px: options.TilePx = None,
     whole: options.Whole = False,
+    max_looks: options.MaxLooks = 0,
     most_words: Annotated[
         int, typer.Option(metavar='K', min=1, max=10, help='Environment words, 0 to K.')
     ] = 3,
@@ -72,11 +75,27 @@ def ablate(
     """
     console = Console()
     inputs = Inputs(
-        dataset, root, images, labels, manifest, drawn, drawn_seed, classes, split, mixed, limit
+        dataset=dataset,
+        root=root,
+        images=images,
+        labels=labels,
+        manifest=manifest,
+        drawn=drawn,
+        drawn_seed=drawn_seed,
+        drawn_px=drawn_px,
+        classes=classes,
+        split=split,
+        mixed=mixed,
+        limit=limit,
     )
     source = open_source(inputs)
     overrides = Overrides(
-        clip=clip, clipseg=clipseg, terms=terms, vocabularies=vocabularies, threads=threads
+        clip=clip,
+        clipseg=clipseg,
+        terms=terms,
+        vocabularies=vocabularies,
+        max_looks=max_looks or source.max_looks,
+        threads=threads,
     )
     cores = build_cores(config, overrides)
     if isinstance(cores, str):

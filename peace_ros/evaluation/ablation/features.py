@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,7 @@ from peace_ros.inference.contract import (
     TEXT_EMBEDDING,
 )
 from peace_ros.segmentation import FUSIONS
+from peace_ros.segmentation.looks import Part, joined, parts_of
 
 if TYPE_CHECKING:
     from peace_ros.inference import Bundle
@@ -28,13 +30,22 @@ if TYPE_CHECKING:
     from peace_ros.segmentation import Terms
 
 _OUTPUTS = (POSITIVE, NEGATIVE, SOFTMAX_POSITIVE)
-Features = Mapping[str, NDArray[np.float32]]
+_Maps = Mapping[str, NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Features:
+    """What the decoder needs of a frame."""
+
+    whole: _Maps
+    of_parts: tuple[_Maps, ...]
+    parts: tuple[Part, ...]
 
 
 class FeatureSegmenter:
     """CLIPSeg in two steps: the image once, then the terms of each prompt, for every fusion."""
 
-    def __init__(self, bundle: Bundle, terms: Terms, threads: int) -> None:
+    def __init__(self, bundle: Bundle, terms: Terms, threads: int, max_looks: int) -> None:
         """Open the graphs; raises BundleError."""
         bundle.require_family('clipseg')
         self._terms = terms
@@ -42,19 +53,28 @@ class FeatureSegmenter:
             bundle, ('image_encoder', 'text_encoder', 'decoder'), threads=threads
         )
         self._text = TextEncoder(bundle, self._sessions['text_encoder'])
-        self._preprocess = Preprocessor(bundle.manifest.input)
+        self._size, self._max_looks = bundle.manifest.input, max_looks
+        self._preprocess = Preprocessor(self._size)
         self._names = [each.name for each in self._sessions['image_encoder'].graph.outputs]
         positive = [1.0] * len(terms.positive)
         self._is_positive = np.array(positive + [0.0] * len(terms.negative), np.float32)
 
     @property
     def encodings(self) -> int:
-        """How many images were encoded."""
+        """How many looks were encoded."""
         return self._sessions['image_encoder'].calls
 
     def encode(self, frame: Frame) -> Features:
-        """Return what the decoder needs of a frame."""
-        pixels = self._preprocess(frame.image_rgb)
+        """Return what the decoder needs of a frame, seen as closely as the segmenter sees it."""
+        image = frame.image_rgb
+        parts = parts_of(
+            (image.shape[1], image.shape[0]), (self._size.width, self._size.height), self._max_looks
+        )
+        of_parts = tuple(self._encoded(part.of(image)) for part in parts)
+        return Features(self._encoded(image), of_parts, parts)
+
+    def _encoded(self, image_rgb: NDArray[np.uint8]) -> _Maps:
+        pixels = self._preprocess(image_rgb)
         arrays = self._sessions['image_encoder'].run(self._names, {PIXEL_VALUES: pixels})
         return dict(zip(self._names, arrays, strict=True))
 
@@ -63,6 +83,16 @@ class FeatureSegmenter:
     ) -> dict[str, NDArray[np.float32]]:
         """Return fusion -> scores h x w float32, 0 to 1, as the network gives them."""
         texts = self._text([prompt.text_for(term) for term in self._terms.all])
+        whole = self._fused(features.whole, texts, fusions)
+        answers = [self._fused(each, texts, fusions) for each in features.of_parts]
+        return {
+            name: joined(whole[name], [answer[name] for answer in answers], features.parts)
+            for name in fusions
+        }
+
+    def _fused(
+        self, features: _Maps, texts: NDArray[np.float32], fusions: Sequence[str]
+    ) -> dict[str, NDArray[np.float32]]:
         feeds = {**features, TEXT_EMBEDDING: texts, IS_POSITIVE: self._is_positive}
         maps = dict(zip(_OUTPUTS, self._sessions['decoder'].run(_OUTPUTS, feeds), strict=True))
         clipped = {name: np.clip(each, 0.0, 1.0) for name, each in maps.items()}

@@ -41,7 +41,7 @@ class Counted:
     frames: tuple[str, ...]
     skipped: tuple[Skipped, ...]
     image_encodings: int
-    """Of the segmenter; the ranker has as many."""
+    """Of the segmenter, each look one."""
 
 
 class _Bench:
@@ -54,7 +54,9 @@ class _Bench:
                 'image once, which clipseg alone allows; choose a preset of that family'
             )
         threads = cores.segmentation.threads
-        self.segmenter = FeatureSegmenter(cores.bundle, cores.segmenter.terms, threads)
+        self.segmenter = FeatureSegmenter(
+            cores.bundle, cores.segmenter.terms, threads, cores.segmentation.clipseg_max_looks
+        )
         clip = ClipEncoder(Bundle.load(cores.prompting.bundle), threads=threads)
         self._encoder = SharedEncoder(clip)
         opposite = OppositeEncoder(self._encoder)

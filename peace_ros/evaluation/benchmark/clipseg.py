@@ -126,7 +126,10 @@ class Line:
 
 
 def _segmenter(setup: Setup, terms: Any) -> ClipSegSegmenter:
-    parameters = SegmentationParameters(threads=setup.threads, providers=(setup.provider,))
+    # The reference sees a frame once, so one look is what is compared.
+    parameters = SegmentationParameters(
+        threads=setup.threads, providers=(setup.provider,), clipseg_max_looks=1
+    )
     return ClipSegSegmenter(Bundle.load(setup.clipseg), terms, parameters)
 
 

@@ -21,7 +21,7 @@ from peace_ros.evaluation.segmentation.inputs import Inputs, open_source
 from peace_ros.evaluation.segmentation.progress import over_images
 from peace_ros.evaluation.segmentation.run import Outcome
 from peace_ros.evaluation.segmentation.run import evaluate as run_evaluation
-from peace_ros.evaluation.segmentation.samples import Source
+from peace_ros.evaluation.segmentation.samples import CAMERA_PX, Source
 from peace_ros.evaluation.segmentation.table import figures_table, remarks_of
 from peace_ros.evaluation.segmentation.threshold import (
     Budget,
@@ -54,12 +54,14 @@ def evaluate(
     manifest: options.Manifest = None,
     drawn: options.Drawn = 0,
     drawn_seed: options.DrawnSeed = None,
+    drawn_px: options.DrawnPx = CAMERA_PX,
     classes: options.ClassTable = 'common',
     split: options.Split = '',
     mixed: options.Mixed = 'ignore',
     limit: options.Limit = None,
     tile_px: options.TilePx = None,
     whole: options.Whole = False,
+    max_looks: options.MaxLooks = 0,
     threshold: Annotated[
         float | None,
         typer.Option(metavar='SCORE', help="The network's score; default: the bundle's own."),
@@ -100,10 +102,29 @@ def evaluate(
     if save and max_false_safe is None:
         raise DatasetError('--save without --max-false-safe: there is no threshold to save')
     inputs = Inputs(
-        dataset, root, images, labels, manifest, drawn, drawn_seed, classes, split, mixed, limit
+        dataset=dataset,
+        root=root,
+        images=images,
+        labels=labels,
+        manifest=manifest,
+        drawn=drawn,
+        drawn_seed=drawn_seed,
+        drawn_px=drawn_px,
+        classes=classes,
+        split=split,
+        mixed=mixed,
+        limit=limit,
     )
     source = open_source(inputs)
-    overrides = Overrides(clip, clipseg, fastsam, fusion, terms, '', threads)
+    overrides = Overrides(
+        clip=clip,
+        clipseg=clipseg,
+        fastsam=fastsam,
+        fusion=fusion,
+        terms=terms,
+        max_looks=max_looks or source.max_looks,
+        threads=threads,
+    )
     configurations = _configurations([*(config or []), *(more_configs or [])], overrides, console)
     if threshold is not None and not 0.0 < threshold < 1.0:
         raise DatasetError(f'--threshold {threshold}: give a score between 0 and 1, both excluded')

@@ -34,6 +34,7 @@ class Overrides:
     fusion: str = ''
     terms: str = ''
     vocabularies: str = ''
+    max_looks: int = 0
     threads: int = 2
 
 
@@ -102,6 +103,7 @@ def build_cores(config: str, overrides: Overrides) -> Cores | str:
         bundle=bundle_name,
         fusion=overrides.fusion or segmentation.fusion,
         terms=overrides.terms or segmentation.terms,
+        clipseg_max_looks=overrides.max_looks or segmentation.clipseg_max_looks,
     )
     bundle = Bundle.load(bundle_name)
     segmenter = create_segmenter(

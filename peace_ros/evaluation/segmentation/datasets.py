@@ -22,6 +22,7 @@ from peace_ros.evaluation.segmentation.samples import (
     Skipped,
     Source,
     mixed_remark,
+    whole_number,
 )
 
 
@@ -64,7 +65,14 @@ def dataset_source(name: str, root: Path, split: str, mixed: str) -> Source:
             f'{title} then has no safe ground: recall and IoU of safe mean nothing, the shares of '
             'hazards called safe do'
         )
-    return Source(title, tuple(samples), tuple(skipped), _tile_px(content, path), tuple(remarks))
+    return Source(
+        title,
+        tuple(samples),
+        tuple(skipped),
+        whole_number(content, 'tile_px', 16, path),
+        tuple(remarks),
+        whole_number(content, 'max_looks', 1, path) or 0,
+    )
 
 
 def _find(content: dict[str, Any], root: Path, path: Path) -> tuple[dict[str, Any], list[Path]]:
@@ -136,10 +144,3 @@ def _of_split(
             f'{root} holds no image of split {split!r}: looked for {", ".join(names)}'
         )
     return chosen
-
-
-def _tile_px(content: dict[str, Any], path: Path) -> int | None:
-    tile_px = content.get('tile_px')
-    if tile_px is not None and not (type(tile_px) is int and tile_px >= 16):
-        raise DatasetError(f'{path}: tile_px {tile_px!r}: give 16 or more')
-    return tile_px

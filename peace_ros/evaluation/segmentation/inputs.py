@@ -11,6 +11,7 @@ from peace_ros.evaluation.segmentation.classes import MIXED
 from peace_ros.evaluation.segmentation.datasets import dataset_source
 from peace_ros.evaluation.segmentation.errors import DatasetError
 from peace_ros.evaluation.segmentation.samples import (
+    CAMERA_PX,
     DRAWN_SEED,
     Source,
     drawn_source,
@@ -31,6 +32,7 @@ class Inputs:
     manifest: Path | None = None
     drawn: int = 0
     drawn_seed: int | None = None
+    drawn_px: int = CAMERA_PX
     classes: str = 'common'
     split: str = ''
     mixed: str = 'ignore'
@@ -70,6 +72,5 @@ def _open(inputs: Inputs) -> Source:
         if inputs.labels is None:
             raise DatasetError(f'--images {inputs.images} without --labels: give their folder')
         return folder_source(inputs.images, inputs.labels, inputs.classes, inputs.mixed)
-    return drawn_source(
-        inputs.drawn, DRAWN_SEED if inputs.drawn_seed is None else inputs.drawn_seed
-    )
+    first_seed = DRAWN_SEED if inputs.drawn_seed is None else inputs.drawn_seed
+    return drawn_source(inputs.drawn, first_seed, inputs.drawn_px)

@@ -28,6 +28,18 @@ Drawn = Annotated[int, typer.Option(metavar='N', min=0, help='Draw N scenes.')]
 DrawnSeed = Annotated[
     int | None, typer.Option(metavar='SEED', min=0, help='First seed of the drawn scenes.')
 ]
+DrawnPx = Annotated[
+    int,
+    typer.Option(metavar='N', min=64, max=4096, help='Side of the camera that sees the scenes.'),
+]
+MaxLooks = Annotated[
+    int,
+    typer.Option(
+        metavar='N',
+        min=0,
+        help='Looks per tile, *_cs; 1: whole only, 0: as dataset and preset say.',
+    ),
+]
 ClassTable = Annotated[
     str, typer.Option(metavar='NAME|FILE', help='Class table of --labels and --manifest.')
 ]

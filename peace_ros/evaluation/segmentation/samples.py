@@ -8,7 +8,7 @@ import csv
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from peace_ros.evaluation.segmentation.classes import (
     Converter,
+    dataset_names,
     find_table,
     parse_classes,
     read_yaml,
@@ -29,7 +30,10 @@ from peace_ros.evaluation.segmentation.rasters import (
 )
 from peace_ros.simulation.drawing import draw_scene
 
-DRAWN_PX = 352
+CAMERA_PX = 1056
+"""Side of the drawn views, where that is not finer than FINEST_M."""
+FINEST_M = 0.02
+"""Metres of ground in the smallest pixel that is drawn: views from low down have fewer pixels."""
 DRAWN_SEED = 20_000_000
 """First seed of drawn scenes here; training stays far below it."""
 HEIGHTS_M = (5.0, 120.0)
@@ -71,6 +75,8 @@ class Source:
     tile_px: int | None = None
     """Side of the square tiles that suits them; None: the shorter side of each image."""
     remarks: tuple[str, ...] = field(default=())
+    max_looks: int = 0
+    """Looks per tile that suit them, see :mod:`peace_ros.segmentation.looks`; 0: no matter."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +109,8 @@ class DrawnSample:
     """A scene that is drawn when it is needed; the same seed gives the same view."""
 
     seed: int
+    camera_px: int = CAMERA_PX
+    """Most pixels on a side."""
 
     @property
     def name(self) -> str:
@@ -119,17 +127,18 @@ class DrawnSample:
     def load(self) -> Pair:
         """Draw it."""
         extent_m = 2.0 * self.height_m * np.tan(np.radians(FOV_DEG / 2.0))
-        scene = draw_scene(self.seed, DRAWN_PX, float(extent_m / DRAWN_PX))
+        side_px = min(self.camera_px, int(extent_m / FINEST_M))
+        scene = draw_scene(self.seed, side_px, float(extent_m / side_px))
         return scene.image_rgb, scene.labels
 
 
-def drawn_source(count: int, first_seed: int = DRAWN_SEED) -> Source:
-    """Return scenes that no training has seen."""
+def drawn_source(count: int, first_seed: int = DRAWN_SEED, camera_px: int = CAMERA_PX) -> Source:
+    """Return scenes that no training has seen, as a square camera of so many pixels sees them."""
     seeds = range(first_seed, first_seed + count)
     low, high = HEIGHTS_M
     return Source(
-        f'{count} drawn scenes, seeds {first_seed} on, from {low:g} to {high:g} m',
-        tuple(DrawnSample(seed) for seed in seeds),
+        f'{count} drawn scenes, seeds {first_seed} on, from {low:g} to {high:g} m, {camera_px} px',
+        tuple(DrawnSample(seed, camera_px) for seed in seeds),
     )
 
 
@@ -198,7 +207,25 @@ def manifest_source(manifest: Path, split: str, classes: str, mixed: str) -> Sou
         else:
             samples.append(FileSample(row['image'], image, label, convert))
     title = f'{manifest}{f", split {split}" if split else ""}'
-    return Source(title, tuple(samples), tuple(skipped), remarks=remarks)
+    max_looks = _looks_of({row.get('dataset') or '' for row in rows})
+    return Source(title, tuple(samples), tuple(skipped), remarks=remarks, max_looks=max_looks)
+
+
+def _looks_of(datasets: set[str]) -> int:
+    """Return the looks that suit the dataset that all rows name, if it is one of the shipped."""
+    (name, *others) = datasets
+    if others or name not in dataset_names():
+        return 0
+    path = find_table(name)
+    return whole_number(read_yaml(path), 'max_looks', 1, path) or 0
+
+
+def whole_number(content: dict[str, Any], key: str, least: int, path: Path) -> int | None:
+    """Return a number that a dataset's file may give; raises DatasetError."""
+    number = content.get(key)
+    if number is None or (type(number) is int and number >= least):
+        return number
+    raise DatasetError(f'{path}: {key} {number!r}: give {least} or more')
 
 
 def mixed_remark(name: str, mixed: str) -> str:
@@ -237,6 +264,7 @@ def sampled(source: Source, limit: int | None) -> Source:
         source.skipped,
         source.tile_px,
         source.remarks,
+        source.max_looks,
     )
 
 
