@@ -24,6 +24,9 @@ _OVERLAP = 0.05
 whole."""
 _SHARE_OF_WHOLE = 0.2
 """Weight of the whole frame in the log-odds of the score."""
+_CAUTION = 0.15
+"""Taken from the log-odds of what is seen in parts: from high up people are few pixels even there.
+On 240 drawn scenes at most 0.7 % of them are then called safe (models/README.md)."""
 _SUREST = 1e-6
 """Scores are taken to lie this far from 0 and 1, so that they have log-odds."""
 
@@ -102,6 +105,7 @@ def joined(whole: Array, answers: Sequence[Array], parts: Sequence[Part]) -> Arr
         closer[top : top + height, left : left + width] = _own(answer, part)
     far = cv2.resize(whole, closer.shape[::-1], interpolation=cv2.INTER_LINEAR)
     mixed = (1.0 - _SHARE_OF_WHOLE) * _log_odds(closer) + _SHARE_OF_WHOLE * _log_odds(far)
+    mixed -= _CAUTION
     # tanh never overflows, where exp would.
     scores: Array = 0.5 * np.tanh(0.5 * mixed, dtype=np.float32) + np.float32(0.5)
     return scores
