@@ -75,19 +75,9 @@ def ablate(
     """
     console = Console()
     inputs = Inputs(
-        dataset=dataset,
-        root=root,
-        images=images,
-        labels=labels,
-        manifest=manifest,
-        drawn=drawn,
-        drawn_seed=drawn_seed,
-        drawn_px=drawn_px,
-        classes=classes,
-        split=split,
-        mixed=mixed,
-        limit=limit,
-    )
+        dataset, root, images, labels, manifest, drawn, drawn_seed, drawn_px,
+        classes, split, mixed, limit,
+    )  # fmt: skip
     source = open_source(inputs)
     overrides = Overrides(
         clip=clip,

@@ -175,6 +175,14 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return content
 
 
+def whole_number(content: dict[str, Any], key: str, least: int, path: Path) -> int | None:
+    """Return a number that a dataset's file may give; raises DatasetError."""
+    number = content.get(key)
+    if number is None or (type(number) is int and number >= least):
+        return number
+    raise DatasetError(f'{path}: {key} {number!r}: give {least} or more')
+
+
 def parse_classes(content: dict[str, Any], where: str) -> ClassTable:
     """Read the table ``classes`` of a dataset's YAML.
 

@@ -102,19 +102,9 @@ def evaluate(
     if save and max_false_safe is None:
         raise DatasetError('--save without --max-false-safe: there is no threshold to save')
     inputs = Inputs(
-        dataset=dataset,
-        root=root,
-        images=images,
-        labels=labels,
-        manifest=manifest,
-        drawn=drawn,
-        drawn_seed=drawn_seed,
-        drawn_px=drawn_px,
-        classes=classes,
-        split=split,
-        mixed=mixed,
-        limit=limit,
-    )
+        dataset, root, images, labels, manifest, drawn, drawn_seed, drawn_px,
+        classes, split, mixed, limit,
+    )  # fmt: skip
     source = open_source(inputs)
     overrides = Overrides(
         clip=clip,

@@ -13,6 +13,7 @@ from peace_ros.evaluation.segmentation.classes import (
     find_table,
     parse_classes,
     read_yaml,
+    whole_number,
 )
 from peace_ros.evaluation.segmentation.errors import DatasetError
 from peace_ros.evaluation.segmentation.rasters import IMAGE_SUFFIXES
@@ -22,7 +23,6 @@ from peace_ros.evaluation.segmentation.samples import (
     Skipped,
     Source,
     mixed_remark,
-    whole_number,
 )
 
 

@@ -8,7 +8,7 @@ import csv
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -20,6 +20,7 @@ from peace_ros.evaluation.segmentation.classes import (
     find_table,
     parse_classes,
     read_yaml,
+    whole_number,
 )
 from peace_ros.evaluation.segmentation.errors import DatasetError, SampleError
 from peace_ros.evaluation.segmentation.rasters import (
@@ -218,14 +219,6 @@ def _looks_of(datasets: set[str]) -> int:
         return 0
     path = find_table(name)
     return whole_number(read_yaml(path), 'max_looks', 1, path) or 0
-
-
-def whole_number(content: dict[str, Any], key: str, least: int, path: Path) -> int | None:
-    """Return a number that a dataset's file may give; raises DatasetError."""
-    number = content.get(key)
-    if number is None or (type(number) is int and number >= least):
-        return number
-    raise DatasetError(f'{path}: {key} {number!r}: give {least} or more')
 
 
 def mixed_remark(name: str, mixed: str) -> str:
