@@ -46,8 +46,8 @@ setup(
     ],
     entry_points={
         'console_scripts': [
-            'peace = peace_ros.entry:peace',
-            *(f'{node} = peace_ros.entry:{node}' for node in NODES),
+            'peace = peace_ros.cli.entry:peace',
+            *(f'{node} = peace_ros.cli.entry:{node}' for node in NODES),
         ],
     },
 )

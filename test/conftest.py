@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from peace_ros.domain import Frame
+from peace_ros.core.domain import Frame
 
 
 def _load_tiny_bundles() -> ModuleType:

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
-from peace_ros.domain import VehicleError
+from peace_ros.core.domain import VehicleError
 
 _RETRY_S = 1.0
 _JOIN_S = 1.0

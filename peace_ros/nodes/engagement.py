@@ -12,9 +12,9 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from peace_ros.domain import Telemetry, VehicleError
-from peace_ros.landing import LandingParameters, State
-from peace_ros.vehicle import VehicleLink
+from peace_ros.core.domain import Telemetry, VehicleError
+from peace_ros.core.landing import LandingParameters, State
+from peace_ros.core.vehicle import VehicleLink
 
 SILENT_STATES = frozenset({State.IDLE, State.ABORTED})
 """States in which nothing is submitted to the vehicle."""

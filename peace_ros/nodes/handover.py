@@ -8,8 +8,8 @@ import threading
 import time
 from collections.abc import Callable
 
-from peace_ros.domain import Site, VehicleError
-from peace_ros.vehicle import MavlinkLink
+from peace_ros.core.domain import Site, VehicleError
+from peace_ros.core.vehicle import MavlinkLink
 
 _PERIOD_S = 0.1
 _ATTEMPTS = 3

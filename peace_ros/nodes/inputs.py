@@ -12,8 +12,8 @@ from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import CompressedImage, Image
 
-from peace_ros.domain import PeaceError
-from peace_ros.landing import LandingCore
+from peace_ros.core.domain import PeaceError
+from peace_ros.core.landing import LandingCore
 from peace_ros.nodes.messages import depth_from_image, frame_from_message, heatmap_from_image
 from peace_ros.nodes.options import LandingOptions
 from peace_ros.nodes.qos import IMAGE_IN

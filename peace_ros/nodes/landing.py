@@ -13,17 +13,17 @@ from typing import Any
 
 from rclpy.clock import Clock, ClockType
 
-from peace_ros.domain import Setpoint, Telemetry, VehicleError
-from peace_ros.landing import Decision, LandingCore, LandingParameters, State
-from peace_ros.mapping import MapParameters
+from peace_ros.core.domain import Setpoint, Telemetry, VehicleError
+from peace_ros.core.landing import Decision, LandingCore, LandingParameters, State
+from peace_ros.core.mapping import MapParameters
+from peace_ros.core.vehicle import SenderParameters, SetpointSender, VehicleLink, VehicleParameters
 from peace_ros.nodes.engagement import SILENT_STATES, EngagementServices, reason_against
 from peace_ros.nodes.inputs import LandingInputs
 from peace_ros.nodes.options import CameraOptions, LandingOptions
 from peace_ros.nodes.parameters import Group
 from peace_ros.nodes.runtime import PeaceNode, run
-from peace_ros.nodes.status import DecisionPublisher, Situation
+from peace_ros.nodes.status import DecisionPublisher, VehicleSituation
 from peace_ros.nodes.vehicle_access import VehicleAccess
-from peace_ros.vehicle import SenderParameters, SetpointSender, VehicleLink, VehicleParameters
 
 PARAMETERS: tuple[Group, ...] = (
     ('', LandingOptions),
@@ -76,7 +76,7 @@ class LandingNode(PeaceNode):
             decision = self._core.step(at_ns, told, age_s)
             self._submit(decision)
         sender = '' if self._sender is None else self._sender.statistics().state.value
-        situation = Situation(told, age_s, self._access.problem, sender)
+        situation = VehicleSituation(told, age_s, self._access.problem, sender)
         self._publisher.publish(decision, situation, at_ns)
         self._access.follow(decision)
         self._engagement.engage_when_ready()

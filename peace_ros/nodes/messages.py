@@ -20,7 +20,7 @@ from geometry_msgs.msg import PointStamped, PoseStamped, TransformStamped, Twist
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from peace_ros.domain import (
+from peace_ros.core.domain import (
     Camera,
     DepthImage,
     Frame,
@@ -31,14 +31,14 @@ from peace_ros.domain import (
     Setpoint,
     Site,
 )
-from peace_ros.domain.geometry import (
+from peace_ros.core.domain.geometry import (
     attitude_ned_frd_to_enu_flu,
     ned_to_enu,
     yaw_from_quaternion,
 )
-from peace_ros.images import jpeg_from_rgb, pixels_from_raw, rgb_from_message
-from peace_ros.poses import pose_from_enu_flu
-from peace_ros.prompting.pairs import prompt_from_pairs, prompt_pairs
+from peace_ros.core.images import jpeg_from_rgb, pixels_from_raw, rgb_from_message
+from peace_ros.core.poses import pose_from_enu_flu
+from peace_ros.core.prompting.pairs import prompt_from_pairs, prompt_pairs
 
 NANOSECONDS = 1_000_000_000
 _FLOAT_BYTES = 4

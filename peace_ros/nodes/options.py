@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from peace_ros.domain import Camera, ConfigurationError
-from peace_ros.domain.parameters import check, parameter
+from peace_ros.core.domain import Camera
+from peace_ros.core.domain.parameters import check, parameter
 
 _TRANSPORTS = ('raw', 'compressed')
 
@@ -113,87 +113,6 @@ class LandingOptions:
     )
     tf_parent: str = parameter('map', 'Local frame (ENU) of the pose in tf')
     tf_child: str = parameter('base_link', 'Frame of the vehicle in tf')
-
-    def __post_init__(self) -> None:
-        check(self)
-
-
-@dataclass(frozen=True)
-class SatelliteViewOptions:
-    """Options of the satellite_view node."""
-
-    world: str = parameter(
-        '', 'Orthophoto (JPEG, PNG, GeoTIFF), north up; empty draws a world from world_seed'
-    )
-    gsd: float = parameter(
-        0.0,
-        'Ground sampling distance of the orthophoto; 0 takes it from a GeoTIFF',
-        unit='m/px',
-        low=0.0,
-        high=10.0,
-    )
-    labels: str = parameter('', 'Label raster of the orthophoto (PNG); empty when there is none')
-    world_seed: int = parameter(0, 'Seed of the drawn world', low=0, high=2**31 - 1)
-    world_size: float = parameter(400.0, 'Edge of the drawn world', unit='m', low=60.0, high=2000.0)
-    world_gsd: float = parameter(
-        0.1, 'Ground sampling distance of the drawn world', unit='m/px', low=0.05, high=2.0
-    )
-    start_x: float = parameter(
-        0.0,
-        'The local origin of the vehicle lies this far east of the centre of the world',
-        unit='m',
-        low=-1e5,
-        high=1e5,
-    )
-    start_y: float = parameter(0.0, 'The same to the north', unit='m', low=-1e5, high=1e5)
-    rate: float = parameter(10.0, 'Frames per second of the pose', unit='Hz', low=0.1, high=120.0)
-    pose_source: str = parameter(
-        'topic',
-        'Where the pose comes from: the topic ground_truth/pose, an autopilot over MAVLink, or '
-        'velocities on the topic cmd_vel that are integrated here',
-        choices=('topic', 'mavlink', 'twist'),
-    )
-    pose_mavlink: str = parameter(
-        '', 'Connection that reports the pose, written as for landing; implies pose_source mavlink'
-    )
-    pose_signing_key_file: str = parameter(
-        '',
-        'File with the key of MAVLink 2 signing on that connection, as '
-        'vehicle.signing_key_file of landing; empty: no signing',
-    )
-    start_altitude: float = parameter(
-        100.0, 'With pose_source twist: altitude at the start', unit='m', low=1.0, high=1000.0
-    )
-    twist_timeout: float = parameter(
-        1.0,
-        'With pose_source twist: the vehicle stops when no velocity came for this long',
-        unit='s',
-        low=0.05,
-        high=60.0,
-    )
-
-    def __post_init__(self) -> None:
-        check(self)
-        if self.pose_source == 'mavlink' and not self.pose_mavlink:
-            raise ConfigurationError(
-                'parameter pose_source = mavlink without pose_mavlink: say where the autopilot is'
-            )
-        if not self.world and self.labels:
-            raise ConfigurationError(
-                f'parameter labels = {self.labels!r} without world: give the orthophoto too'
-            )
-
-
-@dataclass(frozen=True)
-class AutopilotSimOptions:
-    """Options of the autopilot_sim node."""
-
-    pose_rate: float = parameter(
-        50.0, 'Rate of ground_truth/pose, simulated time', unit='Hz', low=1.0, high=200.0
-    )
-    publish_clock: bool = parameter(
-        False, 'Publish /clock also at speed 1 (at any other speed it always is)'
-    )
 
     def __post_init__(self) -> None:
         check(self)

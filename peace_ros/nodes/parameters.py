@@ -15,8 +15,8 @@ from typing import Any, TypeVar
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from peace_ros.domain import ConfigurationError
-from peace_ros.domain.parameters import ParameterInfo, describe
+from peace_ros.core.domain import ConfigurationError
+from peace_ros.core.domain.parameters import ParameterInfo, describe
 
 _Parameters = TypeVar('_Parameters')
 Group = tuple[str, type[Any]]

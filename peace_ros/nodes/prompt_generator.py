@@ -12,8 +12,15 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from peace_ros.domain import PeaceError
-from peace_ros.inference import Bundle, ClipEncoder
+from peace_ros.core.domain import PeaceError
+from peace_ros.core.inference import Bundle, ClipEncoder
+from peace_ros.core.prompting import (
+    PromptGenerator,
+    PromptingParameters,
+    categories_of,
+    load_vocabularies,
+    resolve_template,
+)
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
 from peace_ros.nodes.messages import (
     ERROR,
@@ -27,13 +34,6 @@ from peace_ros.nodes.parameters import Group
 from peace_ros.nodes.qos import RESULT
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.worker import NewestWorker
-from peace_ros.prompting import (
-    PromptGenerator,
-    PromptingParameters,
-    categories_of,
-    load_vocabularies,
-    resolve_template,
-)
 
 PARAMETERS: tuple[Group, ...] = (('', PromptingParameters), ('', PromptGeneratorOptions))
 

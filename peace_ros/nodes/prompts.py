@@ -7,7 +7,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 
-from peace_ros.domain import Prompt
+from peace_ros.core.domain import Prompt
 
 _KEPT = 64
 """Prompts that wait; more frames than this never lie between a frame and its prompt."""

@@ -26,7 +26,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from peace_ros.domain import ConfigurationError, PeaceError
+from peace_ros.core.domain import ConfigurationError, PeaceError
 from peace_ros.nodes.parameters import Group, declare_parameters, refuse_unknown
 
 _Parameters = TypeVar('_Parameters')

@@ -12,7 +12,16 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CompressedImage, Image
 
-from peace_ros.domain import Frame, Heatmap, PeaceError, Prompt
+from peace_ros.core.domain import Frame, Heatmap, PeaceError, Prompt
+from peace_ros.core.prompting import categories_of, resolve_template
+from peace_ros.core.segmentation import (
+    CameraWatch,
+    SegmentationParameters,
+    Segmenter,
+    create_segmenter,
+    draw_overlay,
+    load_terms,
+)
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
 from peace_ros.nodes.messages import (
     ERROR,
@@ -31,15 +40,6 @@ from peace_ros.nodes.prompts import PromptBoard
 from peace_ros.nodes.qos import IMAGE_OUT, RESULT
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.worker import NewestWorker
-from peace_ros.prompting import categories_of, resolve_template
-from peace_ros.segmentation import (
-    CameraWatch,
-    SegmentationParameters,
-    Segmenter,
-    create_segmenter,
-    draw_overlay,
-    load_terms,
-)
 
 PARAMETERS: tuple[Group, ...] = (('', SegmentationParameters), ('', SegmentationOptions))
 _NAME = 'segmentation'

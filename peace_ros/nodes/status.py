@@ -11,9 +11,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, TwistStamped
 from rclpy.node import Node
 
-from peace_ros.domain import Telemetry
-from peace_ros.landing import Decision, State
-from peace_ros.landing.pairs import decision_pairs
+from peace_ros.core.domain import Telemetry
+from peace_ros.core.landing import Decision, State
+from peace_ros.core.landing.pairs import decision_pairs
 from peace_ros.nodes.engagement import SILENT_STATES
 from peace_ros.nodes.messages import (
     ERROR,
@@ -32,7 +32,7 @@ _CONCERNING = frozenset(
 
 
 @dataclass(frozen=True)
-class Situation:
+class VehicleSituation:
     """What the node knows besides the decision."""
 
     telemetry: Telemetry | None
@@ -53,7 +53,7 @@ class DecisionPublisher:
         self._site = node.create_publisher(PointStamped, 'landing/site', RESULT)
         self._status_due_s = 0.0
 
-    def publish(self, decision: Decision, situation: Situation, at_ns: int) -> None:
+    def publish(self, decision: Decision, situation: VehicleSituation, at_ns: int) -> None:
         """Publish a decision; the set-point always, the rest at 10 Hz of the steady clock."""
         if decision.state not in SILENT_STATES:
             self._setpoint.publish(setpoint_to_twist_stamped(decision.setpoint, at_ns))
@@ -68,7 +68,7 @@ class DecisionPublisher:
             self._site.publish(site_to_message(decision.site, at_ns, ground_down_m))
 
 
-def status_message(decision: Decision, situation: Situation, at_ns: int) -> DiagnosticArray:
+def status_message(decision: Decision, situation: VehicleSituation, at_ns: int) -> DiagnosticArray:
     """Return the status; a vehicle that cannot be reached is a HOLD, whatever was decided."""
     state = State.HOLD if situation.problem else decision.state
     reason = situation.problem or decision.reason

@@ -12,9 +12,9 @@ from math import isfinite
 
 from geometry_msgs.msg import Twist
 
-from peace_ros.domain import Pose, Setpoint, Telemetry, VehicleError
+from peace_ros.core.domain import Pose, Setpoint, Telemetry, VehicleError
+from peace_ros.core.vehicle import Answer, RequestResult
 from peace_ros.nodes.messages import setpoint_to_body_twist
-from peace_ros.vehicle import Answer, RequestResult
 
 _POSES = 256
 

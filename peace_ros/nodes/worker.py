@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from peace_ros.domain import PeaceError
+from peace_ros.core.domain import PeaceError
 
 _Item = TypeVar('_Item')
 _JOIN_S = 2.0

@@ -4,7 +4,7 @@
 
 from peace_ros.recording.bag import TYPESTORE, BagReader, BagWriter
 from peace_ros.recording.canvas import save_picture
-from peace_ros.recording.filmstrip import Moment, draw_filmstrip
+from peace_ros.recording.filmstrip import FilmMoment, draw_filmstrip
 from peace_ros.recording.pictures import (
     SiteMark,
     TrackPoint,
@@ -18,7 +18,7 @@ __all__ = [
     'AltitudeProfile',
     'BagReader',
     'BagWriter',
-    'Moment',
+    'FilmMoment',
     'SiteMark',
     'TrackPoint',
     'TrajectoryScene',

@@ -31,7 +31,7 @@ from rosbags.rosbag2 import (
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_typestore
 
-from peace_ros.domain import RecordingError
+from peace_ros.core.domain import RecordingError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import RecordingError
+from peace_ros.core.domain import RecordingError
 
 Image = NDArray[np.uint8]
 Colour = tuple[int, int, int]

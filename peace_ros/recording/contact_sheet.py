@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import RecordingError
+from peace_ros.core.domain import RecordingError
 from peace_ros.recording import canvas
 from peace_ros.recording.canvas import Image
 

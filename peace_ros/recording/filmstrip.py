@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import RecordingError
+from peace_ros.core.domain import RecordingError
 from peace_ros.recording import canvas
 from peace_ros.recording.canvas import Image
 
@@ -22,7 +22,7 @@ _COLUMNS = 6
 
 
 @dataclass(frozen=True)
-class Moment:
+class FilmMoment:
     """One column of the strip."""
 
     state: str
@@ -42,7 +42,7 @@ class Moment:
     """(u, v) of the chosen site as fractions of the frame; may lie outside 0 to 1."""
 
 
-def draw_filmstrip(moments: list[Moment], title: str = '') -> Image:
+def draw_filmstrip(moments: list[FilmMoment], title: str = '') -> Image:
     """Draw frame, heatmap and focus of each moment, at most six moments to a row.
 
     Raises:
@@ -60,7 +60,7 @@ def draw_filmstrip(moments: list[Moment], title: str = '') -> Image:
     return np.vstack([head, *(_draw_row(row, width) for row in rows)])
 
 
-def _draw_row(row: list[Moment], width: int) -> Image:
+def _draw_row(row: list[FilmMoment], width: int) -> Image:
     sheet = canvas.blank(width, _LABEL_PX + 3 * (_CELL_PX + _GAP_PX) + _GAP_PX)
     for number, name in enumerate(('camera', 'heatmap', 'focus')):
         y = _LABEL_PX + number * (_CELL_PX + _GAP_PX) + _CELL_PX // 2
@@ -80,7 +80,7 @@ def _draw_row(row: list[Moment], width: int) -> Image:
     return sheet
 
 
-def _draw_labels(sheet: Image, moment: Moment) -> None:
+def _draw_labels(sheet: Image, moment: FilmMoment) -> None:
     canvas.put_text(sheet, moment.state, (0, 24), scale=0.65, thickness=2)
     altitude = 'no altitude' if moment.altitude_agl_m is None else f'{moment.altitude_agl_m:.1f} m'
     canvas.put_text(sheet, f'{altitude}   at {moment.time_s:.1f} s', (0, 48), scale=0.5)
@@ -107,13 +107,13 @@ def _fit(image: NDArray[np.uint8], interpolation: int) -> Image:
     return cell
 
 
-def _camera(moment: Moment) -> Image:
+def _camera(moment: FilmMoment) -> Image:
     if moment.frame_rgb is None:
         return _missing('no frame yet')
     return _fit(moment.frame_rgb, cv2.INTER_AREA)
 
 
-def _heat(moment: Moment) -> Image:
+def _heat(moment: FilmMoment) -> Image:
     if moment.heatmap is None:
         return _missing('no heatmap yet')
     coloured = canvas.heat_colours(moment.heatmap)
@@ -123,7 +123,7 @@ def _heat(moment: Moment) -> Image:
     return _fit(coloured, cv2.INTER_LINEAR)
 
 
-def _focus(moment: Moment) -> Image:
+def _focus(moment: FilmMoment) -> Image:
     """Darken what the landing node does not look at, and mark the site."""
     if moment.frame_rgb is None:
         return _missing('no frame yet')

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Frame, Pose, RecordingError, VehicleError
-from peace_ros.images import jpeg_from_rgb, rgb_from_message
-from peace_ros.poses import pose_from_enu_flu
+from peace_ros.core.domain import Frame, Pose, RecordingError, VehicleError
+from peace_ros.core.images import jpeg_from_rgb, rgb_from_message
+from peace_ros.core.poses import pose_from_enu_flu
 from peace_ros.recording.bag import TYPESTORE
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 
-from peace_ros.domain import ConfigurationError
+from peace_ros.core.domain import ConfigurationError
 
 RUNS = Path('runs')
 

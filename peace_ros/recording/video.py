@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Frame, Pose, RecordingError
+from peace_ros.core.domain import Frame, Pose, RecordingError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

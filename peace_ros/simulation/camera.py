@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Camera, Label, Pose, is_safe
-from peace_ros.domain.geometry import ground_to_image
+from peace_ros.core.domain import Camera, Label, Pose, is_safe
+from peace_ros.core.domain.geometry import ground_to_image
 from peace_ros.simulation.world import World
 
 _LOWEST_M = 0.2
@@ -22,7 +22,7 @@ _SKY_RGB = (168, 176, 184)
 _HORIZON = 1e-9
 
 
-class View(NamedTuple):
+class CameraView(NamedTuple):
     """One picture of the world."""
 
     image_rgb: NDArray[np.uint8]
@@ -52,7 +52,7 @@ class NadirCamera:
             )
         self._clearance_px: NDArray[np.float32] | None = None
 
-    def view(self, pose: Pose) -> View:
+    def view(self, pose: Pose) -> CameraView:
         """Return what the camera sees; the ground is level, ``altitude_agl_m`` below the vehicle.
 
         Altitudes under 0.2 m are seen from 0.2 m.
@@ -77,7 +77,7 @@ class NadirCamera:
             image[sky] = _SKY_RGB
             if labels is not None:
                 labels[sky] = Label.UNLABELED
-        return View(image, labels, mirrored)
+        return CameraView(image, labels, mirrored)
 
     def labels_at(self, north_m: float, east_m: float, radius_m: float) -> NDArray[np.uint8] | None:
         """Return the labels (N,) of the pixels whose centres lie within a radius of a place.

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Label, WorldError
+from peace_ros.core.domain import Label, WorldError
 from peace_ros.simulation.drawing.town import draw_town
 
 MAX_PIXELS = 400_000_000
@@ -31,7 +31,7 @@ class World:
     image_rgb: NDArray[np.uint8]
     """Height x width x 3, RGB."""
     labels: NDArray[np.uint8] | None
-    """Height x width of :class:`peace_ros.domain.Label`, or None where nobody knows."""
+    """Height x width of :class:`peace_ros.core.domain.Label`, or None where nobody knows."""
     gsd_m: float
     """Ground sampling distance: metres per pixel, both ways."""
     name: str
@@ -109,7 +109,7 @@ def load_world(
         path: the image; up is north.
         gsd_m: metres per pixel; None reads it from the georeference of a GeoTIFF.
         labels: single-channel PNG of the same size with values of
-            :class:`peace_ros.domain.Label`.
+            :class:`peace_ros.core.domain.Label`.
 
     Raises:
         WorldError: a file is missing, empty, damaged, too large or of another size than its

@@ -15,8 +15,8 @@ from dataclasses import replace
 from math import exp, pi, sin
 from pathlib import Path
 
-from peace_ros.domain import Camera, Pose
-from peace_ros.domain.geometry import (
+from peace_ros.core.domain import Camera, Pose
+from peace_ros.core.domain.geometry import (
     attitude_ned_frd_to_enu_flu,
     ned_to_enu,
     quaternion_from_euler,

@@ -16,8 +16,7 @@ pytest.importorskip('transformers')
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image
 
-from peace_ros.demo.processes import ProcessGroup, log_tail
-from peace_ros.evaluation.benchmark.bundles import build_random
+from peace_ros.lab.benchmark.bundles import build_random
 from peace_ros.nodes import qos
 from peace_ros.nodes.messages import (
     heatmap_from_image,
@@ -25,6 +24,8 @@ from peace_ros.nodes.messages import (
     prompt_from_message,
     stamp_ns,
 )
+from peace_ros.simulation.demo.nodes import MODULES
+from peace_ros.simulation.demo.processes import ProcessGroup, log_tail
 
 pytestmark = [pytest.mark.export, pytest.mark.integration, pytest.mark.slow]
 
@@ -49,7 +50,7 @@ def test_one_parameter_changes_the_model_of_a_node(
     with ProcessGroup(tmp_path) as nodes:
         for node, bundle in chosen.items():
             given = ['--ros-args', '-p', f'bundle:={bundles / bundle}']
-            nodes.start(node, f'peace_ros.nodes.{node}', given)
+            nodes.start(node, MODULES[node], given)
         images = bench.peer.create_publisher(Image, 'image', qos.IMAGE_OUT)
         stamps = iter(range(10**9, 10**12, 10**8))
 

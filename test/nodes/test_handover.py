@@ -8,9 +8,9 @@ import time
 
 import pytest
 
-from peace_ros.domain import Pose, Site, Telemetry
+from peace_ros.core.domain import Pose, Site, Telemetry
+from peace_ros.core.vehicle import Answer, RequestResult
 from peace_ros.nodes.handover import AfterHandover
-from peace_ros.vehicle import Answer, RequestResult
 
 SITE = Site(4.0, -3.0, 6.0, 200.0, 0.9, 0.1)
 POSE = Pose(0, 0.0, 0.0, -20.0, (1.0, 0.0, 0.0, 0.0), 20.0)

@@ -13,8 +13,8 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Twist, TwistStamped
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from peace_ros.domain import ConfigurationError, Heatmap, Pose, Telemetry
-from peace_ros.landing import LandingParameters, State
+from peace_ros.core.domain import ConfigurationError, Heatmap, Pose, Telemetry
+from peace_ros.core.landing import LandingParameters, State
 from peace_ros.nodes import qos
 from peace_ros.nodes.engagement import reason_against
 from peace_ros.nodes.landing import LandingNode

@@ -9,7 +9,7 @@ from array import array
 import numpy as np
 from sensor_msgs.msg import Image
 
-from peace_ros.landing import LandingCore
+from peace_ros.core.landing import LandingCore
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
 from peace_ros.nodes.messages import time_from_ns

@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from peace_ros.domain import Camera, Heatmap
-from peace_ros.landing import LandingCore
+from peace_ros.core.domain import Camera, Heatmap
+from peace_ros.core.landing import LandingCore
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
 from peace_ros.nodes.messages import heatmap_to_image, image_message

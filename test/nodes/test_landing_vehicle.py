@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from peace_ros.domain import Heatmap
+from peace_ros.core.domain import Heatmap
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
 from peace_ros.nodes.messages import heatmap_to_image

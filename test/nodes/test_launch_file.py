@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from peace_ros.nodes.parameter_docs import NODE_PARAMETERS, named
+from peace_ros.lab.parameter_docs import NODE_PARAMETERS, named
 
 ROOT = Path(__file__).resolve().parents[2]
 

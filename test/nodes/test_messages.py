@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CompressedImage, Image
 
-from peace_ros.domain import (
+from peace_ros.core.domain import (
     Camera,
     ConfigurationError,
     Heatmap,
@@ -27,7 +27,7 @@ from peace_ros.domain import (
     Site,
     VehicleError,
 )
-from peace_ros.domain.geometry import quaternion_from_euler
+from peace_ros.core.domain.geometry import quaternion_from_euler
 from peace_ros.nodes import messages
 
 STAMP = 1_700_000_123_456_789_012

@@ -12,9 +12,9 @@ import pytest
 import yaml
 from rclpy.parameter import Parameter
 
-from peace_ros.domain import ConfigurationError
-from peace_ros.domain.parameters import check, parameter
-from peace_ros.nodes.parameter_docs import (
+from peace_ros.core.domain import ConfigurationError
+from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.lab.parameter_docs import (
     NODE_PARAMETERS,
     allowed,
     defaults_yaml,

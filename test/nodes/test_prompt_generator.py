@@ -7,7 +7,7 @@ from __future__ import annotations
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CompressedImage, Image
 
-from peace_ros.domain import Prompt, RankedWord
+from peace_ros.core.domain import Prompt, RankedWord
 from peace_ros.nodes import qos
 from peace_ros.nodes.messages import jpeg_message, prompt_from_message, stamp_ns
 from peace_ros.nodes.prompt_generator import PromptGeneratorNode

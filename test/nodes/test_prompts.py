@@ -7,7 +7,7 @@ from __future__ import annotations
 import threading
 import time
 
-from peace_ros.domain import Prompt
+from peace_ros.core.domain import Prompt
 from peace_ros.nodes.prompts import PromptBoard
 
 

@@ -13,12 +13,14 @@ from pathlib import Path
 
 import pytest
 
+from peace_ros.simulation.demo.nodes import MODULES
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def start(node: str, *arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, '-m', f'peace_ros.nodes.{node}', '--ros-args', *arguments],
+        [sys.executable, '-m', MODULES[node], '--ros-args', *arguments],
         cwd=ROOT,
         env={**os.environ, 'PYTHONUNBUFFERED': '1'},
         stdout=subprocess.PIPE,
@@ -30,6 +32,7 @@ def start(node: str, *arguments: str) -> subprocess.Popen[str]:
 SLOW_NODE = """
 import sys, time
 from std_msgs.msg import String
+from peace_ros.simulation.demo.nodes import MODULES
 from peace_ros.nodes.runtime import PeaceNode, run
 
 class SlowNode(PeaceNode):

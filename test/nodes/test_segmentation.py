@@ -11,7 +11,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CompressedImage, Image
 
-from peace_ros.domain import Heatmap, Prompt
+from peace_ros.core.domain import Heatmap, Prompt
 from peace_ros.nodes import qos
 from peace_ros.nodes.messages import (
     WARN,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import threading
 
-from peace_ros.domain import ImageError
+from peace_ros.core.domain import ImageError
 from peace_ros.nodes.worker import NewestWorker
 
 LIMIT_S = 10.0

@@ -8,18 +8,18 @@ import sys
 import pytest
 
 BLOCKED_IN = {
-    'domain': ['rclpy', 'torch', 'pymavlink', 'onnxruntime', 'cv2'],
-    'prompting': ['rclpy', 'torch', 'pymavlink', 'onnxruntime', 'cv2'],
-    'inference': ['rclpy', 'torch', 'pymavlink'],
-    'segmentation': ['rclpy', 'torch', 'pymavlink'],
-    'mapping': ['rclpy', 'torch', 'pymavlink', 'onnxruntime'],
-    'landing': ['rclpy', 'torch', 'pymavlink', 'onnxruntime'],
-    'vehicle': ['rclpy', 'torch', 'onnxruntime', 'cv2'],
+    'core.domain': ['rclpy', 'torch', 'pymavlink', 'onnxruntime', 'cv2'],
+    'core.prompting': ['rclpy', 'torch', 'pymavlink', 'onnxruntime', 'cv2'],
+    'core.inference': ['rclpy', 'torch', 'pymavlink'],
+    'core.segmentation': ['rclpy', 'torch', 'pymavlink'],
+    'core.mapping': ['rclpy', 'torch', 'pymavlink', 'onnxruntime'],
+    'core.landing': ['rclpy', 'torch', 'pymavlink', 'onnxruntime'],
+    'core.vehicle': ['rclpy', 'torch', 'onnxruntime', 'cv2'],
     'simulation': ['rclpy', 'torch', 'pymavlink', 'onnxruntime'],
     'simulation.autopilot': ['rclpy', 'torch', 'onnxruntime'],
     'recording': ['rclpy', 'torch', 'pymavlink', 'onnxruntime'],
-    'replay': ['rclpy', 'torch', 'pymavlink'],
-    'cli': ['rclpy', 'torch', 'pymavlink', 'onnxruntime', 'cv2'],
+    'lab.replay': ['rclpy', 'torch', 'pymavlink'],
+    'cli.main': ['rclpy', 'torch', 'pymavlink', 'onnxruntime', 'cv2'],
 }
 
 PROGRAM = """

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from peace_ros.domain import ImageError, RecordingError
+from peace_ros.core.domain import ImageError, RecordingError
 from peace_ros.recording import TYPESTORE, BagReader, BagWriter
 from peace_ros.recording.messages import (
     diagnostic_array,

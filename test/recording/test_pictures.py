@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 import pytest
 
-from peace_ros.domain import RecordingError
+from peace_ros.core.domain import RecordingError
 from peace_ros.recording import (
-    Moment,
+    FilmMoment,
     SiteMark,
     TrackPoint,
     TrajectoryScene,
@@ -97,11 +97,11 @@ def test_without_a_pose_there_is_no_trajectory() -> None:
         draw_trajectory(scene(track=()))
 
 
-def moment(state: str, **changes) -> Moment:
+def moment(state: str, **changes) -> FilmMoment:
     frame = np.full((352, 352, 3), 120, np.uint8)
     heatmap = np.zeros((176, 176), np.uint8)
     heatmap[:, 88:] = 255
-    plain = Moment(state, 3.0, 80.0, 'A photo of {term}.', frame, heatmap)
+    plain = FilmMoment(state, 3.0, 80.0, 'A photo of {term}.', frame, heatmap)
     return replace(plain, **changes)
 
 

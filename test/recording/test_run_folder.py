@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from peace_ros.domain import ConfigurationError
+from peace_ros.core.domain import ConfigurationError
 from peace_ros.recording.run_folder import create_run_folder
 
 

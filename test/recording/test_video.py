@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from peace_ros.domain import RecordingError
+from peace_ros.core.domain import RecordingError
 from peace_ros.recording import AltitudeProfile, VideoReader, VideoWriter
 
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from peace_ros.domain import Camera, Label, Pose
-from peace_ros.domain.geometry import ground_to_image, quaternion_from_euler
+from peace_ros.core.domain import Camera, Label, Pose
+from peace_ros.core.domain.geometry import ground_to_image, quaternion_from_euler
 from peace_ros.simulation import NadirCamera, World
 
 RED = (255, 0, 0)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from peace_ros.domain import Label, WorldError
+from peace_ros.core.domain import Label, WorldError
 from peace_ros.simulation.drawing import (
     CONDITIONS,
     LAYOUTS,
@@ -22,7 +22,7 @@ from peace_ros.simulation.drawing.palette import Palette
 from peace_ros.simulation.drawing.plan import Plan, Thing, Warp
 from peace_ros.simulation.drawing.scene import Look, render
 from peace_ros.simulation.drawing.sprites import stamp_thing
-from peace_ros.simulation.drawing.window import Window
+from peace_ros.simulation.drawing.window import DrawnWindow
 
 PLAIN = Look((1.0, 1.0, 1.0), 1.0, 1.0, 0.0, 0.0, 0.0, 0.4)
 NOON = Sun(0.3, 0.7, 1.0)
@@ -34,9 +34,9 @@ def lawn() -> Plan:
     return Plan(Warp(0.0), palette.material('lawn'))
 
 
-def window(size_m: float, gsd_m: float) -> Window:
+def window(size_m: float, gsd_m: float) -> DrawnWindow:
     count = round(size_m / gsd_m)
-    return Window(-size_m / 2, -size_m / 2, count, count, gsd_m)
+    return DrawnWindow(-size_m / 2, -size_m / 2, count, count, gsd_m)
 
 
 def test_every_layout_is_drawn_however_small_the_piece_of_ground():
@@ -249,7 +249,7 @@ def test_unknown_condition_is_refused():
 
 
 def test_a_thing_outside_of_the_picture_leaves_no_label_at_its_edge():
-    window = Window(left_m=0.0, top_m=0.0, width_px=40, height_px=40, gsd_m=0.05)
+    window = DrawnWindow(left_m=0.0, top_m=0.0, width_px=40, height_px=40, gsd_m=0.05)
     canvas = Canvas(window, seed=1)
     # Its circle touches the picture, none of its opaque pixels do.
     thing = Thing('person', 2.3, 1.0, pi / 2, 0.45, 0.3, (200.0, 30.0, 30.0), Label.PERSON)

@@ -8,16 +8,16 @@ import cv2
 import numpy as np
 import pytest
 
-from peace_ros.domain import Label
+from peace_ros.core.domain import Label
 from peace_ros.simulation.drawing.grain import Grain, draw_grain, structure
 from peace_ros.simulation.drawing.noise import Noise
 from peace_ros.simulation.drawing.palette import Palette
-from peace_ros.simulation.drawing.window import Window
+from peace_ros.simulation.drawing.window import DrawnWindow
 
 
-def _window(gsd_m: float, size_m: float = 16.0, left_m: float = -8.0) -> Window:
+def _window(gsd_m: float, size_m: float = 16.0, left_m: float = -8.0) -> DrawnWindow:
     count = round(size_m / gsd_m)
-    return Window(left_m, -8.0, count, count, gsd_m)
+    return DrawnWindow(left_m, -8.0, count, count, gsd_m)
 
 
 def _drawn(grain: Grain, gsd_m: float = 0.05, left_m: float = -8.0) -> np.ndarray:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from peace_ros.domain import Label, WorldError, is_safe
+from peace_ros.core.domain import Label, WorldError, is_safe
 from peace_ros.simulation import World, draw_world, load_world
 
 

@@ -11,8 +11,8 @@ from math import radians
 from types import TracebackType
 from typing import final
 
-from peace_ros.domain.errors import VehicleError
-from peace_ros.domain.motion import Pose
+from peace_ros.core.domain.errors import VehicleError
+from peace_ros.core.domain.motion import Pose
 from peace_ros.simulation.autopilot.disturbance import Disturbance
 from peace_ros.simulation.autopilot.fault_port import FaultServer
 from peace_ros.simulation.autopilot.flight import Flight

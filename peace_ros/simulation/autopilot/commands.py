@@ -10,7 +10,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.domain.geometry import rotation_matrix
+from peace_ros.core.domain.geometry import rotation_matrix
 from peace_ros.simulation.autopilot.flight import FORCE_MAGIC, Flight
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import Mode, Result

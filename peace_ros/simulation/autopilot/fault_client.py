@@ -9,7 +9,7 @@ import socket
 import time
 from typing import Any
 
-from peace_ros.domain.errors import VehicleError
+from peace_ros.core.domain.errors import VehicleError
 
 LOOPBACK = '127.0.0.1'
 MAX_BYTES = 8192

@@ -8,7 +8,7 @@ import json
 import socket
 from typing import TYPE_CHECKING, Any
 
-from peace_ros.domain.errors import VehicleError
+from peace_ros.core.domain.errors import VehicleError
 from peace_ros.simulation.autopilot.fault_client import LOOPBACK, MAX_BYTES
 from peace_ros.simulation.autopilot.faults import inject
 

@@ -22,7 +22,7 @@ from inspect import Parameter, signature
 from math import isinf, radians
 from typing import TYPE_CHECKING, Any
 
-from peace_ros.domain.errors import VehicleError
+from peace_ros.core.domain.errors import VehicleError
 from peace_ros.simulation.autopilot.disturbance import Disturbance
 from peace_ros.simulation.autopilot.fault_client import FaultClient
 

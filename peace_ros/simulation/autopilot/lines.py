@@ -7,7 +7,7 @@ from __future__ import annotations
 import select
 import socket
 
-from peace_ros.domain.errors import VehicleError
+from peace_ros.core.domain.errors import VehicleError
 from peace_ros.simulation.autopilot.serial_ports import RECEIVE_BYTES, Address, SerialPorts
 
 MAX_DATAGRAMS = 256

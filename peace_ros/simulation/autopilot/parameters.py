@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from peace_ros.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import check, parameter
 
 
 @dataclass(frozen=True)

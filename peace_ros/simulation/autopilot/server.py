@@ -29,7 +29,7 @@ TEXT_BYTES = 50
 
 
 @dataclass
-class Peer:
+class GroundStation:
     """Somebody who has spoken to the server."""
 
     codec: Any
@@ -57,7 +57,7 @@ class MavlinkServer:
         self._disturbance = disturbance or Disturbance()
         self._streams = Streams(parameters, self._personality, self._disturbance)
         self._signing = Signing(parameters.signing_key_file)
-        self._peers: dict[Address, Peer] = {}
+        self._peers: dict[Address, GroundStation] = {}
         self._values: dict[str, float] = {
             'GUID_TIMEOUT': 3.0,
             'GUID_OPTIONS': 0.0,
@@ -140,7 +140,7 @@ class MavlinkServer:
         for peer in list(self._peers.values()):
             self._send_streams(flight, peer)
 
-    def _send_streams(self, flight: Flight, peer: Peer) -> None:
+    def _send_streams(self, flight: Flight, peer: GroundStation) -> None:
         for message_id, interval in peer.interval_s.items():
             due = peer.due_s[message_id]
             if flight.time_s < due:
@@ -162,14 +162,14 @@ class MavlinkServer:
             self.rejected_bytes += len(data)
         return good
 
-    def _peer(self, address: Address) -> Peer:
+    def _peer(self, address: Address) -> GroundStation:
         peer = self._peers.get(address)
         if peer is None:
             if len(self._peers) >= MAX_PEERS:
                 silent = min(self._peers.values(), key=lambda each: each.turn)
                 self._forget(silent.address)
             codec = self._signing.codec(self._parameters.system_id, COMPONENT_ID)
-            peer = self._peers[address] = Peer(
+            peer = self._peers[address] = GroundStation(
                 codec,
                 self._signing.codec(),
                 address,
@@ -180,7 +180,7 @@ class MavlinkServer:
         peer.turn = self._turn
         return peer
 
-    def _handle(self, flight: Flight, peer: Peer, message: Any) -> None:
+    def _handle(self, flight: Flight, peer: GroundStation, message: Any) -> None:
         target = getattr(message, 'target_system', 0)
         if target == 0:
             self._forward(peer, message)
@@ -198,7 +198,7 @@ class MavlinkServer:
         else:
             run_message(flight, message)
 
-    def _command(self, flight: Flight, peer: Peer, m: Any) -> None:
+    def _command(self, flight: Flight, peer: GroundStation, m: Any) -> None:
         if m.get_type() == 'COMMAND_INT':
             p: Params = (m.param1, m.param2, m.param3, m.param4, float(m.x), float(m.y), m.z)
         else:
@@ -245,7 +245,7 @@ class MavlinkServer:
         del self._peers[address]
         self._lines.hang_up(address)
 
-    def _set_interval(self, flight: Flight, peer: Peer, p: Params) -> Result:
+    def _set_interval(self, flight: Flight, peer: GroundStation, p: Params) -> Result:
         if not (isfinite(p[0]) and isfinite(p[1])) or not self._streams.knows(int(p[0])):
             return Result.DENIED
         message_id = int(p[0])
@@ -256,7 +256,7 @@ class MavlinkServer:
         peer.due_s[message_id] = flight.time_s
         return Result.ACCEPTED
 
-    def _parameter(self, peer: Peer, m: Any) -> None:
+    def _parameter(self, peer: GroundStation, m: Any) -> None:
         names = sorted(self._values)
         kind = m.get_type()
         if kind == 'PARAM_REQUEST_LIST':
@@ -291,7 +291,7 @@ class MavlinkServer:
         for peer in list(self._peers.values()):
             self._tell(peer, message)
 
-    def _tell(self, peer: Peer, message: Any) -> None:
+    def _tell(self, peer: GroundStation, message: Any) -> None:
         if message is None or self._disturbance.silent:
             return
         if self._disturbance.mutes(message.get_type()):
@@ -300,7 +300,7 @@ class MavlinkServer:
         peer.codec.seq = (peer.codec.seq + 1) % 256
         self._tell_bytes(peer, data)
 
-    def _forward(self, sender: Peer, message: Any) -> None:
+    def _forward(self, sender: GroundStation, message: Any) -> None:
         """Hand what is meant for anybody to the other peers, as a real autopilot does."""
         if self._disturbance.silent:
             return
@@ -308,7 +308,7 @@ class MavlinkServer:
             if peer is not sender:
                 self._tell_bytes(peer, bytes(message.get_msgbuf()))
 
-    def _tell_bytes(self, peer: Peer, data: bytes) -> None:
+    def _tell_bytes(self, peer: GroundStation, data: bytes) -> None:
         for leaving in peer.outward.carry(data):
             if not self._lines.tell(peer.address, leaving):
                 # A full buffer loses a datagram; a TCP line that stalls is closed.

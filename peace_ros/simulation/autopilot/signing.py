@@ -14,7 +14,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.domain.errors import ConfigurationError
+from peace_ros.core.domain.errors import ConfigurationError
 
 EPOCH_S = 1_420_070_400
 """1 January 2015, where the time stamps of signatures begin."""

@@ -14,7 +14,7 @@ from peace_ros.simulation.drawing.grain import structure
 from peace_ros.simulation.drawing.noise import FloatImage, Noise
 from peace_ros.simulation.drawing.palette import Material, Rgb
 from peace_ros.simulation.drawing.plan import Ground, Plan
-from peace_ros.simulation.drawing.window import Window
+from peace_ros.simulation.drawing.window import DrawnWindow
 
 _FINER = 2
 
@@ -22,7 +22,7 @@ _FINER = 2
 class Canvas:
     """Colour in full sun, label and height of each pixel of a window."""
 
-    def __init__(self, window: Window, seed: int) -> None:
+    def __init__(self, window: DrawnWindow, seed: int) -> None:
         self.window = window
         self.noise = Noise(window, seed)
         self.rgb: FloatImage = np.zeros((*window.shape, 3), np.float32)
@@ -45,10 +45,10 @@ class Canvas:
             return None
         return slice(r0, r1), slice(c0, c1)
 
-    def sub_window(self, rows: slice, columns: slice) -> Window:
+    def sub_window(self, rows: slice, columns: slice) -> DrawnWindow:
         """Return the window of a region."""
         w = self.window
-        return Window(
+        return DrawnWindow(
             w.left_m + columns.start * w.gsd_m,
             w.top_m + rows.start * w.gsd_m,
             columns.stop - columns.start,

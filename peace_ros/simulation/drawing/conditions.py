@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Label, WorldError
+from peace_ros.core.domain import Label, WorldError
 
 Image = NDArray[np.float32]
 Labels = NDArray[np.uint8]

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Label
+from peace_ros.core.domain import Label
 from peace_ros.simulation.drawing.canvas import Canvas
 from peace_ros.simulation.drawing.light import Sun
 from peace_ros.simulation.drawing.noise import FloatImage

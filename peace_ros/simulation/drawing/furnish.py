@@ -9,7 +9,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from peace_ros.domain import Label
+from peace_ros.core.domain import Label
 from peace_ros.simulation.drawing.palette import Material, Palette, jitter
 from peace_ros.simulation.drawing.plan import Plan
 from peace_ros.simulation.drawing.sprites import label_of

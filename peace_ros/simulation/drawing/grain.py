@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Label
+from peace_ros.core.domain import Label
 from peace_ros.simulation.drawing.noise import FloatImage, Noise
-from peace_ros.simulation.drawing.window import Window
+from peace_ros.simulation.drawing.window import DrawnWindow
 
 Array = NDArray[np.floating[Any]]
 
@@ -89,7 +89,7 @@ def draw_grain(rng: np.random.Generator, kind: str, label: Label) -> Grain:
 
 
 def structure(
-    window: Window, noise: Noise, grains: Sequence[Grain], ids: NDArray[np.int16]
+    window: DrawnWindow, noise: Noise, grains: Sequence[Grain], ids: NDArray[np.int16]
 ) -> FloatImage:
     """Return the relative brightness that the grains add, float32 height x width.
 
@@ -133,7 +133,7 @@ def _stones(noise: Noise) -> FloatImage:
     )
 
 
-def _cracks(window: Window, noise: Noise) -> FloatImage:
+def _cracks(window: DrawnWindow, noise: Noise) -> FloatImage:
     """Return thin lines where smooth noise changes its sign."""
     wide_m = max(0.05, window.gsd_m)
     field = noise.octave(2, _CRACKS) + 0.35 * noise.octave(0, _CRACKS)
@@ -142,7 +142,7 @@ def _cracks(window: Window, noise: Noise) -> FloatImage:
 
 
 def _add_oriented(
-    total: FloatImage, window: Window, noise: Noise, grain: Grain, own: NDArray[np.bool_]
+    total: FloatImage, window: DrawnWindow, noise: Noise, grain: Grain, own: NDArray[np.bool_]
 ) -> None:
     """Add slabs and ripples of one ground where it lies."""
     rows, columns = np.nonzero(own)

@@ -10,7 +10,7 @@ from math import pi
 
 import numpy as np
 
-from peace_ros.domain import Label
+from peace_ros.core.domain import Label
 from peace_ros.simulation.drawing import blocks, open_ground
 from peace_ros.simulation.drawing.furnish import Block, Furnisher
 from peace_ros.simulation.drawing.palette import Material, Palette

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.simulation.drawing.window import Window
+from peace_ros.simulation.drawing.window import DrawnWindow
 
 FloatImage = NDArray[np.float32]
 
@@ -32,7 +32,7 @@ class Noise:
     ground at any resolution and in any window.
     """
 
-    def __init__(self, window: Window, seed: int) -> None:
+    def __init__(self, window: DrawnWindow, seed: int) -> None:
         self._window = window
         self._seed = seed
         self._octaves: dict[tuple[int, int], FloatImage] = {}
@@ -74,14 +74,14 @@ class Noise:
             return self._sampled(w, exponent, variant)
         coarse_gsd = w.gsd_m * factor
         rows, columns = -(-w.height_px // factor) + 2, -(-w.width_px // factor) + 2
-        coarse = Window(w.left_m - coarse_gsd, w.top_m - coarse_gsd, columns, rows, coarse_gsd)
+        coarse = DrawnWindow(w.left_m - coarse_gsd, w.top_m - coarse_gsd, columns, rows, coarse_gsd)
         small = self._sampled(coarse, exponent, variant)
         large = cv2.resize(small, (columns * factor, rows * factor))
         return np.ascontiguousarray(
             large[factor : factor + w.height_px, factor : factor + w.width_px], np.float32
         )
 
-    def _sampled(self, w: Window, exponent: int, variant: int) -> FloatImage:
+    def _sampled(self, w: DrawnWindow, exponent: int, variant: int) -> FloatImage:
         wavelength = 2.0**exponent
         rng = np.random.Generator(np.random.PCG64([self._seed, exponent + 64, variant]))
         angle = rng.uniform(0.0, 2.0 * pi)

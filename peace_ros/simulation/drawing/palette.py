@@ -10,7 +10,7 @@ from math import cos, exp, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Label
+from peace_ros.core.domain import Label
 from peace_ros.simulation.drawing.grain import Grain, draw_grain
 
 Rgb = tuple[float, float, float]

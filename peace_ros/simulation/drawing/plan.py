@@ -12,7 +12,7 @@ from math import atan2, cos, hypot, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import Label
+from peace_ros.core.domain import Label
 from peace_ros.simulation.drawing.palette import Material, Rgb
 
 Points = NDArray[np.float64]

@@ -8,7 +8,7 @@ from math import cos, sin
 
 import numpy as np
 
-from peace_ros.domain import Label
+from peace_ros.core.domain import Label
 from peace_ros.simulation.drawing.canvas import Canvas
 from peace_ros.simulation.drawing.grain import Array, line_share, to_edge
 from peace_ros.simulation.drawing.light import Sun

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.domain import WorldError
+from peace_ros.core.domain import WorldError
 from peace_ros.simulation.drawing.canvas import Canvas, paint_ground
 from peace_ros.simulation.drawing.crowns import draw_trees
 from peace_ros.simulation.drawing.layouts import LAYOUTS, plan_layout
@@ -20,7 +20,7 @@ from peace_ros.simulation.drawing.palette import SEASONS
 from peace_ros.simulation.drawing.plan import Plan
 from peace_ros.simulation.drawing.roofs import draw_building
 from peace_ros.simulation.drawing.sprites import stamp_barrier, stamp_thing
-from peace_ros.simulation.drawing.window import Window
+from peace_ros.simulation.drawing.window import DrawnWindow
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Scene:
     image_rgb: NDArray[np.uint8]
     """size x size x 3."""
     labels: NDArray[np.uint8]
-    """size x size of :class:`peace_ros.domain.Label`, no pixel UNLABELED."""
+    """size x size of :class:`peace_ros.core.domain.Label`, no pixel UNLABELED."""
     gsd_m: float
     season: str
     layout: str
@@ -69,7 +69,7 @@ class Look:
         )
 
 
-def render(plan: Plan, window: Window, seed: int, sun: Sun, look: Look) -> Canvas:
+def render(plan: Plan, window: DrawnWindow, seed: int, sun: Sun, look: Look) -> Canvas:
     """Draw a plan in a window; the canvas then holds the final colours, labels and heights."""
     canvas = Canvas(window, seed)
     paint_ground(canvas, plan)
@@ -141,7 +141,7 @@ def draw_scene(
     look = Look.draw(rng)
     extent = round(size_px * gsd_m, 6)
     plan = plan_layout(rng, layout, season, extent)
-    window = Window(-0.5 * extent, -0.5 * extent, size_px, size_px, gsd_m)
+    window = DrawnWindow(-0.5 * extent, -0.5 * extent, size_px, size_px, gsd_m)
     canvas = render(plan, window, seed, sun, look)
     return Scene(develop(canvas, look, seed), canvas.labels, gsd_m, season, layout)
 

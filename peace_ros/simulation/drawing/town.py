@@ -16,7 +16,7 @@ from peace_ros.simulation.drawing.palette import SEASONS, Palette
 from peace_ros.simulation.drawing.plan import Plan, Warp
 from peace_ros.simulation.drawing.river import add_river
 from peace_ros.simulation.drawing.scene import Look, develop, render
-from peace_ros.simulation.drawing.window import Window
+from peace_ros.simulation.drawing.window import DrawnWindow
 
 _TILE_PX = 1000
 _MARGIN_M = 24.0
@@ -39,7 +39,7 @@ def draw_town(seed: int, size_px: int, gsd_m: float) -> tuple[NDArray[np.uint8],
     for top in range(0, size_px, _TILE_PX):
         for left in range(0, size_px, _TILE_PX):
             rows, columns = min(_TILE_PX, size_px - top), min(_TILE_PX, size_px - left)
-            window = Window(
+            window = DrawnWindow(
                 (left - margin) * gsd_m - 0.5 * extent,
                 (top - margin) * gsd_m - 0.5 * extent,
                 columns + 2 * margin,

@@ -13,7 +13,7 @@ _SHIFT_BITS = 5
 
 
 @dataclass(frozen=True)
-class Window:
+class DrawnWindow:
     """Pixels of ``gsd_m`` metres; x grows east (right), y grows south (down)."""
 
     left_m: float
@@ -37,9 +37,9 @@ class Window:
         """South edge."""
         return self.top_m + self.height_px * self.gsd_m
 
-    def finer(self, factor: int) -> Window:
+    def finer(self, factor: int) -> DrawnWindow:
         """Return the same ground with pixels ``factor`` times smaller."""
-        return Window(
+        return DrawnWindow(
             self.left_m,
             self.top_m,
             self.width_px * factor,

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from peace_ros.domain.errors import ConfigurationError
+from peace_ros.core.domain.errors import ConfigurationError
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
 
 

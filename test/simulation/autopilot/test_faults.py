@@ -8,7 +8,7 @@ import socket
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.domain import VehicleError
+from peace_ros.core.domain import VehicleError
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
 from peace_ros.simulation.autopilot.faults import FAULTS, FaultClient, inject
 

@@ -8,7 +8,7 @@ import time
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.domain.errors import VehicleError
+from peace_ros.core.domain.errors import VehicleError
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.domain.errors import VehicleError
+from peace_ros.core.domain.errors import VehicleError
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
 
 

@@ -1,0 +1,60 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The console scripts.
+
+What they run takes seconds to import, and an interrupt in those seconds would end in a traceback
+from inside somebody's library. So the import happens here, under a handler that ends quietly.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+from types import FrameType
+from typing import Any
+
+EXIT_INTERRUPTED = 130
+
+
+def _leave(_number: int, _frame: FrameType | None) -> None:
+    # An exception could be swallowed or dressed up by whatever import it strikes.
+    os._exit(EXIT_INTERRUPTED)
+
+
+def start(module: str) -> Any:
+    """Import a module and run its ``main``; an interrupt before that is exit status 130."""
+    previous = signal.signal(signal.SIGINT, _leave)
+    main = importlib.import_module(module).main
+    signal.signal(signal.SIGINT, previous)
+    return main()
+
+
+def peace() -> Any:
+    """Run the command line."""
+    return start('peace_ros.cli.main')
+
+
+def prompt_generator() -> Any:
+    """Run the node of this name, as all below."""
+    return start('peace_ros.nodes.prompt_generator')
+
+
+def segmentation() -> Any:
+    """Run the node."""
+    return start('peace_ros.nodes.segmentation')
+
+
+def landing() -> Any:
+    """Run the node."""
+    return start('peace_ros.nodes.landing')
+
+
+def satellite_view() -> Any:
+    """Run the node."""
+    return start('peace_ros.simulation.nodes.satellite_view')
+
+
+def autopilot_sim() -> Any:
+    """Run the node."""
+    return start('peace_ros.simulation.nodes.autopilot_sim')

@@ -1,0 +1,39 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The nouns of the project, with units, and the conversions between their frames."""
+
+from peace_ros.core.domain.errors import (
+    BundleError,
+    ConfigurationError,
+    ImageError,
+    PeaceError,
+    RecordingError,
+    VehicleError,
+    WorldError,
+)
+from peace_ros.core.domain.labels import SAFE_LABELS, Label, is_safe
+from peace_ros.core.domain.motion import Pose, Setpoint, Site, Telemetry
+from peace_ros.core.domain.perception import Camera, DepthImage, Frame, Heatmap, Prompt, RankedWord
+
+__all__ = [
+    'SAFE_LABELS',
+    'BundleError',
+    'Camera',
+    'ConfigurationError',
+    'DepthImage',
+    'Frame',
+    'Heatmap',
+    'ImageError',
+    'Label',
+    'PeaceError',
+    'Pose',
+    'Prompt',
+    'RankedWord',
+    'RecordingError',
+    'Setpoint',
+    'Site',
+    'Telemetry',
+    'VehicleError',
+    'WorldError',
+    'is_safe',
+]

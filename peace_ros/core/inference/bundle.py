@@ -1,0 +1,140 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Model bundles: a folder with manifest.json, ONNX files and tokenizer.json, checked on load."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from peace_ros.core.domain import BundleError
+from peace_ros.core.inference.manifest import FileEntry, InputSpec, Manifest, parse_manifest
+from peace_ros.core.resources import models_dir
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = ['MANIFEST_NAME', 'Bundle', 'FileEntry', 'InputSpec', 'Manifest']
+
+MANIFEST_NAME = 'manifest.json'
+_CHUNK_BYTES = 1 << 20
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A model bundle whose files were all there, whole and unchanged when it was loaded."""
+
+    folder: Path
+    manifest: Manifest
+    checksum: str
+    """SHA-256 (hex) of the manifest, which holds that of every file: one name for all of it."""
+    paths: Mapping[str, Path]
+    """Role -> file."""
+
+    @classmethod
+    def load(cls, path_or_name: Path | str) -> Bundle:
+        """Load from a folder, or by name: the bundles of the package, then the user's own.
+
+        Raises BundleError that names the file, what is wrong with it and what to do. The graphs
+        are held against their family's tensors when a session opens them.
+        """
+        folder = _find(path_or_name)
+        manifest_path = folder / MANIFEST_NAME
+        try:
+            raw = manifest_path.read_bytes()
+        except OSError as error:
+            raise BundleError(
+                f'{manifest_path}: {error.strerror}; a bundle is a folder with a {MANIFEST_NAME}'
+            ) from error
+        manifest = parse_manifest(raw, str(manifest_path))
+        for name, entry in manifest.files.items():
+            _check_file(folder / name, entry)
+        paths = {role: folder / name for role, name in manifest.roles.items()}
+        return cls(folder, manifest, hashlib.sha256(raw).hexdigest(), MappingProxyType(paths))
+
+    def require_family(self, family: str) -> None:
+        """Raise BundleError unless the bundle is of this family."""
+        if self.manifest.family != family:
+            raise BundleError(
+                f'{self.folder / MANIFEST_NAME}: family is {self.manifest.family!r} where '
+                f'{family!r} is needed; choose another bundle'
+            )
+
+
+def user_models_dir() -> Path:
+    """Return the user's folder of bundles: PEACE_MODELS_DIR or one in the home directory."""
+    return Path(os.environ.get('PEACE_MODELS_DIR', '~/.local/share/peace_ros/models')).expanduser()
+
+
+def put_in_place(stage: Path, folder: Path) -> None:
+    """Let a finished folder take the place of another beside it; raises OSError.
+
+    An older bundle is set aside first and comes back when the new one cannot be moved.
+    """
+    old = folder.with_name(f'.{folder.name}.old')
+    if folder.exists():
+        shutil.rmtree(old, ignore_errors=True)
+        folder.rename(old)
+    try:
+        stage.rename(folder)
+    except OSError:
+        if old.exists():
+            old.rename(folder)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _find(path_or_name: Path | str) -> Path:
+    folder = Path(path_or_name).expanduser()
+    if folder.is_dir():
+        return folder
+    shipped = models_dir()
+    name = str(path_or_name)
+    if name and Path(name).name == name:
+        for place in (shipped, user_models_dir()):
+            if (place / name).is_dir():
+                return place / name
+    names = sorted(each.parent.name for each in shipped.glob(f'*/{MANIFEST_NAME}'))
+    raise BundleError(
+        f'no model bundle {name!r}: give a folder with a {MANIFEST_NAME} or the name of a '
+        f'shipped bundle ({", ".join(names) or "none"} in {shipped})'
+    )
+
+
+def file_entry(path: Path) -> dict[str, str | int]:
+    """Return what a manifest says of a file: its SHA-256 and its size."""
+    return {'sha256': sha256_of(path), 'bytes': path.stat().st_size}
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file, in hex; raises OSError."""
+    digest = hashlib.sha256()
+    with path.open('rb') as file:
+        while chunk := file.read(_CHUNK_BYTES):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+def _check_file(path: Path, entry: FileEntry) -> None:
+    try:
+        size = path.stat().st_size
+        if size != entry.bytes:
+            raise BundleError(
+                f'{path}: {size} bytes where the manifest says {entry.bytes}; '
+                'fetch or build the bundle again'
+            )
+        found = sha256_of(path)
+    except OSError as error:
+        raise BundleError(
+            f'{path}: {error.strerror}, yet the manifest lists it; fetch or build the bundle again'
+        ) from error
+    if found != entry.sha256:
+        raise BundleError(
+            f'{path}: SHA-256 {found} where the manifest says {entry.sha256}; '
+            'the file was changed or damaged, fetch or build the bundle again'
+        )

@@ -1,0 +1,19 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A map of safe ground and telemetry become a decision: state, verdict, set-point."""
+
+from peace_ros.core.landing.core import LandingCore
+from peace_ros.core.landing.decision import Decision, Focus, Verdict, VerdictKind
+from peace_ros.core.landing.parameters import SAFETY_THRESHOLD_FLOOR, LandingParameters
+from peace_ros.core.landing.states import State
+
+__all__ = [
+    'SAFETY_THRESHOLD_FLOOR',
+    'Decision',
+    'Focus',
+    'LandingCore',
+    'LandingParameters',
+    'State',
+    'Verdict',
+    'VerdictKind',
+]

@@ -1,0 +1,126 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The landing in one object: poses, heatmaps and telemetry in, decisions out; no clock, no thread.
+
+The order of a step is that of responsibility: data, site, state, guidance, guard.
+"""
+
+from __future__ import annotations
+
+from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, Pose, Telemetry
+from peace_ros.core.landing.decision import Decision
+from peace_ros.core.landing.helm import Command, Helm
+from peace_ros.core.landing.intake import HeatmapIntake
+from peace_ros.core.landing.lookout import Lookout, Sighting
+from peace_ros.core.landing.parameters import LandingParameters
+from peace_ros.core.landing.states import State
+from peace_ros.core.landing.watch import valid_pose
+from peace_ros.core.mapping import MapParameters, SafetyMap
+
+_JUMP_NS = 1_000_000_000
+"""A clock that goes back by more than this has begun anew."""
+
+
+class LandingCore:
+    """Brings a vehicle down over safe ground; not thread-safe.
+
+    Times are nanoseconds of one clock, that of the stamps of poses and heatmaps.
+    """
+
+    def __init__(
+        self,
+        parameters: LandingParameters,
+        camera: Camera,
+        map_parameters: MapParameters | None = None,
+    ) -> None:
+        self.parameters = parameters
+        self.safety_map = SafetyMap(map_parameters)
+        self._intake = HeatmapIntake(parameters, camera, self.safety_map)
+        self._lookout = Lookout(parameters, self.safety_map)
+        self._helm = Helm(parameters)
+        self._last_ns: int | None = None
+        self._drops = 0
+
+    @property
+    def state(self) -> State:
+        """The state that the last step ended in."""
+        return self._helm.state
+
+    def add_pose(self, pose: Pose) -> None:
+        """Keep a pose for the heatmaps of its time; poses come in the order of their stamps."""
+        self._intake.add_pose(pose)
+
+    def add_heatmap(self, heatmap: Heatmap) -> None:
+        """Put a heatmap into the map with the pose at its stamp, or count why not."""
+        self._intake.add_heatmap(heatmap)
+
+    def add_depth(self, depth: DepthImage) -> None:
+        """Let a depth image close ground that is not flat; optional, and it opens nothing."""
+        self._intake.add_depth(depth)
+
+    def add_view(self, frame: Frame) -> None:
+        """Keep the picture of a frame, which carries the map on while no position is known."""
+        self._intake.add_view(frame)
+
+    def engage(self) -> None:
+        """Begin a landing, also after one that ended in ABORTED, HANDOVER or HOLD."""
+        self._lookout.begin()
+        self._helm.engage()
+
+    def disengage(self) -> None:
+        """Stop: the set-point is zero and the state IDLE from the next step on."""
+        self._helm.disengage()
+
+    def step(self, now_ns: int, telemetry: Telemetry | None, telemetry_age_s: float) -> Decision:
+        """Decide what to do now.
+
+        Args:
+            now_ns: The clock of the stamps.
+            telemetry: What the autopilot last said, None before it said anything.
+            telemetry_age_s: Since it was received, by a steady clock.
+        """
+        self._keep_time(now_ns)
+        self._intake.tick(now_ns)
+        if self._intake.drops != self._drops:
+            self._drops = self._intake.drops
+            self._lookout.forget_choice()
+        pose = valid_pose(telemetry, self.parameters)
+        sighting = self._lookout.look(now_ns, pose, self._helm.state, self._helm.without_site_s)
+        command = self._helm.decide(
+            now_ns, telemetry, telemetry_age_s, sighting, self._intake.last_rejection
+        )
+        if command.state is not command.before and self._lookout.follow(
+            command.before, command.state, now_ns
+        ):
+            self._helm.fail_attempt()
+        return self._decision(command, sighting)
+
+    def _keep_time(self, now_ns: int) -> None:
+        """A clock that jumps back (a simulation begun anew) makes everything known worthless."""
+        if self._last_ns is not None and now_ns < self._last_ns - _JUMP_NS:
+            self.safety_map.clear()
+            self._intake.clear()
+            self._lookout.forget_choice()
+            self._helm.restart_clock(now_ns)
+        self._last_ns = now_ns
+
+    def _decision(self, command: Command, sighting: Sighting) -> Decision:
+        relaxed = sighting.threshold < self.parameters.safety_threshold
+        note = f'; threshold relaxed to {sighting.threshold:.2f}' if relaxed else ''
+        return Decision(
+            state=command.state,
+            reason=command.reason + note,
+            setpoint=command.setpoint,
+            verdict=sighting.verdict,
+            site=sighting.verdict.site,
+            effective_threshold=sighting.threshold,
+            map_age_s=sighting.map_age_s,
+            focus=sighting.focus,
+            guard_notes=command.guard_notes,
+            counts=dict(self._intake.counts),
+            outcome=command.outcome,
+            time_in_state_s=command.time_in_state_s,
+            failed_sites=self._lookout.failed_sites,
+            attempts=self._helm.attempts,
+            relaxed=relaxed,
+        )

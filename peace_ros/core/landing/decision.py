@@ -1,0 +1,82 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a step of the landing answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from peace_ros.core.domain import Setpoint, Site
+from peace_ros.core.landing.states import State
+
+
+class VerdictKind(str, Enum):
+    """Is there a place to land?"""
+
+    SITE = 'SITE'
+    NO_ZONE = 'NO_ZONE'
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """SITE with a site, or NO_ZONE with a reason."""
+
+    kind: VerdictKind
+    reason: str
+    """A sentence."""
+    site: Site | None = None
+
+    @classmethod
+    def found(cls, site: Site) -> Verdict:
+        """Build SITE."""
+        reason = f'site with {site.clearance_m:.1f} m of clearance'
+        return cls(VerdictKind.SITE, reason, site)
+
+    @classmethod
+    def no_zone(cls, reason: str) -> Verdict:
+        """Build NO_ZONE."""
+        return cls(VerdictKind.NO_ZONE, reason)
+
+
+@dataclass(frozen=True)
+class Focus:
+    """Circle on the ground in which a site may be chosen."""
+
+    north_m: float
+    east_m: float
+    radius_m: float
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Everything that one step decided, for the vehicle, the status topic and the display."""
+
+    state: State
+    reason: str
+    """Why the state is what it is, and what motion waits for."""
+    setpoint: Setpoint
+    """Guarded: this is what may be sent."""
+    verdict: Verdict
+    site: Site | None
+    """Target of AIMING and LANDING; the candidate while SEARCHING."""
+    effective_threshold: float
+    """Safety score from which ground counts as safe now."""
+    map_age_s: float
+    """Age of the newest heatmap in the map; infinite without one."""
+    focus: Focus | None
+    """None while no position is known."""
+    guard_notes: tuple[str, ...] = ()
+    """Which limits made the motion smaller."""
+    counts: Mapping[str, int] = field(default_factory=dict)
+    """Heatmaps by fate: used, or the reason of the rejection."""
+    outcome: str | None = None
+    """`handover`, `no_zone`, `timeout`, `battery` or `aborted` once it is over."""
+    time_in_state_s: float = 0.0
+    failed_sites: int = 0
+    """Places that are left out because they failed."""
+    attempts: int = 0
+    """Descents that failed."""
+    relaxed: bool = False
+    """The threshold has sunk below its parameter, which only the parameter relaxation allows."""

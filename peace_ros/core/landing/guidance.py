@@ -1,0 +1,205 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Velocity set-points of each state: towards the site, down over it, never across the unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import hypot
+
+from peace_ros.core.domain import Pose, Setpoint, Site
+from peace_ros.core.landing.parameters import LandingParameters
+from peace_ros.core.landing.states import State
+
+_FLOOR_GAIN = 0.6
+"""1/s; descending at this rate of the remaining height, the autopilot's second of delay
+(0.7 m beyond at 1 m/s) is used up before the floor."""
+_CREEP_M_S = 0.3
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What guidance needs to know of one moment."""
+
+    stamp_ns: int
+    """Of the heatmap that the choice rests on."""
+    pose: Pose
+    site: Site | None
+    """None unless it is known and can be reached."""
+    at_safe_altitude: bool
+    ground_is_fresh: bool
+    """The ground under the vehicle was seen a moment ago and is safe."""
+    search_target: tuple[float, float] | None
+    """Where the search goes next (north, east); None while it looks."""
+    search_altitude_m: float
+    home: tuple[float, float] | None = None
+    """Where the landing began (north, east)."""
+
+
+def over_site(pose: Pose, site: Site, radius_m: float) -> bool:
+    """Tell whether the vehicle and its radius lie within the clearance of the site."""
+    return site.distance_m(pose) + radius_m <= site.clearance_m
+
+
+def velocity(
+    state: State, situation: Situation, parameters: LandingParameters
+) -> tuple[Setpoint, str]:
+    """Return the wished set-point and what motion waits for (empty when for nothing)."""
+    fly = _FLIGHTS.get(state)
+    if fly is None:
+        return Setpoint(situation.stamp_ns), ''
+    return fly(situation, parameters)
+
+
+def _towards(
+    pose: Pose, north_m: float, east_m: float, gain: float, limit_m_s: float
+) -> tuple[float, float]:
+    """Return north and east speed, proportional to the error in metres up to a limit.
+
+    With gain 0.5 the distance left, 2 s x speed, exceeds the measured distances of stopping
+    (3.1 m at 3 m/s, 7.0 m at 5 m/s) at every speed.
+    """
+    north, east = north_m - pose.north_m, east_m - pose.east_m
+    distance = hypot(north, east)
+    if distance < 1e-6:
+        return 0.0, 0.0
+    speed = min(limit_m_s, gain * distance)
+    return speed * north / distance, speed * east / distance
+
+
+def _descent_speed(altitude_m: float, parameters: LandingParameters) -> float:
+    p = parameters
+    speed = p.z_gain_landing * p.z_speed_landing * altitude_m
+    return min(p.z_speed_landing, max(p.z_min_speed_landing, speed))
+
+
+def _down(
+    situation: Situation,
+    parameters: LandingParameters,
+    floor_m: float,
+    tolerance_m: float,
+    share: float,
+) -> tuple[float, str]:
+    """Return the speed of descent towards a floor, and what it waits for."""
+    site, pose = situation.site, situation.pose
+    room_m = pose.altitude_agl_m - floor_m
+    if site is None or room_m <= 0.0:
+        return 0.0, ''
+    if not situation.ground_is_fresh:
+        return 0.0, 'waiting for a fresh look at the ground below'
+    error_m = site.distance_m(pose)
+    if tolerance_m <= 0.0 or error_m >= tolerance_m:
+        return (
+            0.0,
+            f'{error_m:.1f} m beside the site: descends within {max(tolerance_m, 0.0):.1f} m',
+        )
+    # Full speed within half of the tolerance, none at its edge.
+    centred = min(1.0, 2.0 * (1.0 - error_m / tolerance_m))
+    speed = share * _descent_speed(pose.altitude_agl_m, parameters) * centred
+    return min(speed, max(_CREEP_M_S, _FLOOR_GAIN * room_m)), ''
+
+
+def _lateral_to_site(
+    situation: Situation, parameters: LandingParameters, gain: float, limit_m_s: float
+) -> tuple[float, float]:
+    site, pose = situation.site, situation.pose
+    if site is None:
+        return 0.0, 0.0
+    if not situation.at_safe_altitude:
+        if site.distance_m(pose) > site.clearance_m:
+            return 0.0, 0.0
+        limit_m_s = min(limit_m_s, parameters.landing_lateral_speed_limit)
+    return _towards(pose, site.north_m, site.east_m, gain, limit_m_s)
+
+
+def _aim(situation: Situation, parameters: LandingParameters) -> tuple[Setpoint, str]:
+    p, site = parameters, situation.site
+    gain = p.gain * p.aiming_gain_mult
+    north, east = _lateral_to_site(situation, p, gain, p.lateral_speed_limit)
+    tolerance = 0.0 if site is None else site.clearance_m - p.safety_radius_m
+    down, note = _down(situation, p, p.aiming_floor * p.safe_altitude_m, tolerance, 0.5)
+    return Setpoint(situation.stamp_ns, north, east, down), note
+
+
+def _land(situation: Situation, parameters: LandingParameters) -> tuple[Setpoint, str]:
+    p, site = parameters, situation.site
+    north, east = _lateral_to_site(situation, p, p.gain, p.lateral_speed_limit)
+    room = 0.0 if site is None else site.clearance_m - p.safety_radius_m
+    tolerance = min(max(0.5, 0.5 * room), room)
+    down, note = _down(situation, p, p.handover_altitude_m, tolerance, 1.0)
+    return Setpoint(situation.stamp_ns, north, east, down), note
+
+
+def _climb(situation: Situation, parameters: LandingParameters) -> tuple[Setpoint, str]:
+    return Setpoint(situation.stamp_ns, 0.0, 0.0, -parameters.z_speed_climbing), ''
+
+
+def _search(situation: Situation, parameters: LandingParameters) -> tuple[Setpoint, str]:
+    """Look from higher up, then from elsewhere; only where lateral motion meets nothing."""
+    p, pose = parameters, situation.pose
+    if not situation.at_safe_altitude or situation.site is not None:
+        return Setpoint(situation.stamp_ns), 'looking'
+    missing_m = situation.search_altitude_m - pose.altitude_agl_m
+    up = min(p.z_speed_climbing, 0.5 * missing_m) if missing_m > 1.0 else 0.0
+    if situation.search_target is None:
+        return Setpoint(situation.stamp_ns, 0.0, 0.0, -up), 'looking'
+    north, east = _towards(pose, *situation.search_target, p.gain, p.search_speed)
+    return Setpoint(situation.stamp_ns, north, east, -up), 'flying an expanding square'
+
+
+def _return(situation: Situation, parameters: LandingParameters) -> tuple[Setpoint, str]:
+    """Up to where lateral motion meets nothing, then straight home."""
+    if situation.home is None:
+        return Setpoint(situation.stamp_ns), 'where the landing began is not known'
+    if not situation.at_safe_altitude:
+        return _climb(situation, parameters)
+    p = parameters
+    north, east = _towards(situation.pose, *situation.home, p.gain, p.search_speed)
+    return Setpoint(situation.stamp_ns, north, east), ''
+
+
+_FLIGHTS: dict[State, Callable[[Situation, LandingParameters], tuple[Setpoint, str]]] = {
+    State.AIMING: _aim,
+    State.LANDING: _land,
+    State.CLIMBING: _climb,
+    State.SEARCHING: _search,
+    State.RESTARTING: _search,
+    State.RETURNING: _return,
+}
+"""States that move; every other one stands still."""
+
+
+class ExpandingSquare:
+    """Way-points of an expanding square (IAMSAR), clockwise from north, begun anew at its limit."""
+
+    _ARRIVED_M = 5.0
+    _TURNS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+
+    def __init__(self, home: tuple[float, float], spacing_m: float, radius_m: float) -> None:
+        self._home = home
+        self._spacing_m = spacing_m
+        self._radius_m = radius_m
+        self._begin()
+
+    def _begin(self) -> None:
+        self._leg = 0
+        self._north, self._east = self._home
+        self._advance()
+
+    def _advance(self) -> None:
+        turn_north, turn_east = self._TURNS[self._leg % 4]
+        length = (self._leg // 2 + 1) * self._spacing_m
+        self._north += turn_north * length
+        self._east += turn_east * length
+        self._leg += 1
+
+    def target(self, pose: Pose) -> tuple[float, float]:
+        """Return the way-point to fly to from here (north, east), within the radius of home."""
+        if hypot(self._north - pose.north_m, self._east - pose.east_m) <= self._ARRIVED_M:
+            self._advance()
+        if hypot(self._north - self._home[0], self._east - self._home[1]) > self._radius_m:
+            self._begin()
+            if self._spacing_m > self._radius_m:
+                return self._home
+        return self._north, self._east

@@ -1,0 +1,271 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""From what is known to what is flown: events, state, guidance, guard; knows no map.
+
+Everything between a sighting and a set-point is here, so that tests can put any sequence of
+sightings and telemetry before it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot, inf
+
+from peace_ros.core.domain import Pose, Setpoint, Site, Telemetry
+from peace_ros.core.landing.guard import Guard, GuardInput
+from peace_ros.core.landing.guidance import ExpandingSquare, Situation, over_site, velocity
+from peace_ros.core.landing.lookout import LOOKING, Sighting
+from peace_ros.core.landing.parameters import LandingParameters
+from peace_ros.core.landing.states import STILL_STATES, Events, State, next_state
+from peace_ros.core.landing.watch import (
+    Budget,
+    ControlWatch,
+    at_safe_altitude,
+    bad_map,
+    bad_telemetry,
+    valid_pose,
+)
+
+_NS = 1e-9
+_AIMED_M = 1.0
+"""AIMING has descended enough this close to its floor."""
+_HIGHEST_SEARCH_M = 120.0
+_HOME_M = 3.0
+"""RETURNING has arrived within this."""
+_FENCE_MARGIN_M = 5.0
+"""The search turns this far before the fence."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """What a step decided to do."""
+
+    state: State
+    before: State
+    """The state until this step."""
+    reason: str
+    setpoint: Setpoint
+    guard_notes: tuple[str, ...]
+    outcome: str | None
+    time_in_state_s: float
+
+
+class Helm:
+    """Steers one vehicle; not thread-safe."""
+
+    def __init__(self, parameters: LandingParameters) -> None:
+        self._p = parameters
+        self._engaged = self._new_engagement = False
+        self.state = State.IDLE
+        self._reason = 'not engaged'
+        self._since_ns: int | None = None
+        self._revision_at_state = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        self._guard = Guard(self._p)
+        self._control = ControlWatch()
+        self._budget = Budget(self._p)
+        self._home: Pose | None = None
+        self._square: ExpandingSquare | None = None
+        self._outcome: str | None = None
+
+    @classmethod
+    def engaged_in(cls, parameters: LandingParameters, state: State) -> Helm:
+        """Build one whose engagement has come to a state, for trials that begin in each."""
+        helm = cls(parameters)
+        helm.engage()
+        helm.state, helm._new_engagement = state, False
+        helm._reason = f'the trial begins in {state.value}'
+        return helm
+
+    def engage(self) -> None:
+        """Begin a landing, also after one that ended."""
+        self._engaged = self._new_engagement = True
+        self._begin()
+
+    def disengage(self) -> None:
+        """Stop: zero and IDLE from the next step on."""
+        self._engaged = self._new_engagement = False
+
+    def restart_clock(self, now_ns: int) -> None:
+        """The clock has jumped back: the state begins now."""
+        self._since_ns = now_ns
+
+    def fail_attempt(self) -> None:
+        """Count a descent that failed."""
+        self._budget.fail_attempt()
+
+    @property
+    def attempts(self) -> int:
+        """Descents that failed in this engagement."""
+        return self._budget.attempts
+
+    @property
+    def without_site_s(self) -> float:
+        """How long a site has been looked for in vain."""
+        return self._budget.without_site_s
+
+    def decide(
+        self,
+        now_ns: int,
+        telemetry: Telemetry | None,
+        telemetry_age_s: float,
+        sighting: Sighting,
+        last_rejection: str = '',
+    ) -> Command:
+        """Decide what to do now.
+
+        Args:
+            now_ns: The clock of the stamps.
+            telemetry: What the autopilot last said, None before it said anything.
+            telemetry_age_s: Since it was received, by a steady clock.
+            sighting: What the map says.
+            last_rejection: Why the newest heatmap was not used, for the sentence.
+        """
+        p = self._p
+        if self._since_ns is None:
+            self._since_ns = now_ns
+        pose = valid_pose(telemetry, p)
+        bad_data = bad_telemetry(telemetry, telemetry_age_s, p)
+        bad_data = bad_data or bad_map(sighting.map_age_s, last_rejection, p)
+        site = None if bad_data else sighting.reachable
+        if self._engaged:
+            self._keep_books(now_ns, telemetry, pose, sighting, bad_data)
+        before = self.state
+        self._advance(now_ns, self._events(pose, site, sighting, bad_data), sighting)
+        wish, note = self._guide(now_ns, pose, site, sighting)
+        home = None if self._home is None else (self._home.north_m, self._home.east_m)
+        given = GuardInput(
+            now_ns,
+            pose,
+            telemetry_age_s,
+            sighting.map_age_s,
+            home,
+            sighting.verdict.site,
+            sighting.ground_score,
+            sighting.ground_age_s,
+        )
+        setpoint, guard_notes = self._guard.limit(wish, given)
+        return Command(
+            state=self.state,
+            before=before,
+            reason=f'{self._reason}; {note}' if note else self._reason,
+            setpoint=setpoint,
+            guard_notes=guard_notes,
+            outcome=self._outcome,
+            time_in_state_s=self._time_in_state_s(now_ns),
+        )
+
+    def _time_in_state_s(self, now_ns: int) -> float:
+        since_ns = now_ns if self._since_ns is None else self._since_ns
+        return max(0.0, (now_ns - since_ns) * _NS)
+
+    # --- state
+
+    def _keep_books(
+        self,
+        now_ns: int,
+        telemetry: Telemetry | None,
+        pose: Pose | None,
+        sighting: Sighting,
+        bad_data: str,
+    ) -> None:
+        self._control.see(telemetry)
+        if self._home is None and pose is not None:
+            self._home = pose
+        known = not bad_data and sighting.reachable is not None
+        looking = self.state in LOOKING and not bad_data
+        self._budget.spend(now_ns, telemetry, looking=looking, site_known=known)
+        if self._has_nothing_left(pose, sighting, known=known, bad_data=bad_data):
+            self._budget.finish_policy()
+
+    def _has_nothing_left(
+        self, pose: Pose | None, sighting: Sighting, *, known: bool, bad_data: str
+    ) -> bool:
+        """Tell whether the policy for a used-up budget is done."""
+        if not self._budget.policy_open or pose is None or bad_data:
+            return False
+        if self._p.budget_policy == 'best_site':
+            return self.state in LOOKING and not known and sighting.best is None
+        home = self._home
+        if home is None:
+            return True
+        return hypot(home.north_m - pose.north_m, home.east_m - pose.east_m) <= _HOME_M
+
+    def _events(
+        self, pose: Pose | None, site: Site | None, sighting: Sighting, bad_data: str
+    ) -> Events:
+        p = self._p
+        altitude_m = inf if pose is None else pose.altitude_agl_m
+        seen = sighting.revision - self._revision_at_state
+        over, error_m = False, inf
+        if pose is not None and site is not None:
+            over, error_m = over_site(pose, site, p.safety_radius_m), site.distance_m(pose)
+        return Events(
+            engaged=self._engaged,
+            new_engagement=self._new_engagement,
+            taken_over=self._control.taken_over,
+            out_of_budget=self._budget.reason,
+            policy_open=self._budget.policy_open,
+            bad_data=bad_data,
+            site_known=site is not None,
+            warmed_up=seen >= p.sensor_warm_up_cycles,
+            over_site=over and sighting.ground_is_fresh,
+            centred=error_m <= p.handover_error_m,
+            at_safe_altitude=at_safe_altitude(pose, p),
+            low_enough_to_land=altitude_m <= p.aiming_floor * p.safe_altitude_m + _AIMED_M,
+            at_handover_altitude=altitude_m <= p.handover_altitude_m + p.handover_tolerance_m,
+        )
+
+    def _advance(self, now_ns: int, events: Events, sighting: Sighting) -> None:
+        before = self.state
+        state, reason = next_state(before, events, self._time_in_state_s(now_ns), self._p)
+        self._new_engagement = False
+        self._reason = reason or self._reason
+        self._outcome = self._outcome or {
+            State.HANDOVER: 'handover',
+            State.ABORTED: 'aborted',
+            State.HOLD: None if events.policy_open else self._budget.outcome or None,
+        }.get(state)
+        if state is not before:
+            self.state, self._since_ns = state, now_ns
+            self._revision_at_state = sighting.revision
+
+    # --- motion
+
+    def _guide(
+        self, now_ns: int, pose: Pose | None, site: Site | None, sighting: Sighting
+    ) -> tuple[Setpoint, str]:
+        if pose is None or self.state in STILL_STATES:
+            return Setpoint(sighting.stamp_ns), ''
+        home = self._home or pose
+        situation = Situation(
+            stamp_ns=sighting.stamp_ns,
+            pose=pose,
+            site=site,
+            at_safe_altitude=at_safe_altitude(pose, self._p),
+            ground_is_fresh=sighting.ground_is_fresh,
+            search_target=self._search_target(now_ns, pose, home, sighting),
+            search_altitude_m=min(home.altitude_agl_m, _HIGHEST_SEARCH_M),
+            home=(home.north_m, home.east_m),
+        )
+        return velocity(self.state, situation, self._p)
+
+    def _search_target(
+        self, now_ns: int, pose: Pose, home: Pose, sighting: Sighting
+    ) -> tuple[float, float] | None:
+        p = self._p
+        if self.state not in LOOKING:
+            return None
+        if self._budget.outcome and sighting.best is not None:
+            return sighting.best.north_m, sighting.best.east_m
+        if self._time_in_state_s(now_ns) < p.search_hold_s:
+            return None
+        if self._square is None:
+            radius_m = p.search_radius_m
+            if p.geofence_radius_m > 0.0:
+                radius_m = min(radius_m, max(0.0, p.geofence_radius_m - _FENCE_MARGIN_M))
+            around = (home.north_m, home.east_m)
+            self._square = ExpandingSquare(around, p.search_spacing_m, radius_m)
+        return self._square.target(pose)

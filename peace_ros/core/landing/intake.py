@@ -1,0 +1,214 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which heatmaps reach the map, and with which pose; and when the map is worthless.
+
+A map rests on where the vehicle was. When the position jumps, or for a while nothing tells it, what
+lies where is not known any more, and the map is dropped rather than guessed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+
+import numpy as np
+
+from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, ImageError, Pose
+from peace_ros.core.landing.odometry import PositionCarrier
+from peace_ros.core.landing.parameters import LandingParameters
+from peace_ros.core.landing.picture_watch import PictureWatch
+from peace_ros.core.landing.poses import Miss, PoseHistory, jump_m
+from peace_ros.core.mapping import RefusedLookError, SafetyMap
+
+_PENDING_LIMIT = 4
+
+
+class HeatmapIntake:
+    """Pairs heatmaps with poses by stamp; what cannot be used is counted with its reason."""
+
+    def __init__(
+        self, parameters: LandingParameters, camera: Camera, safety_map: SafetyMap
+    ) -> None:
+        self._p = parameters
+        self._camera = camera
+        self._map = safety_map
+        self._poses = PoseHistory(parameters.pose_gap_limit_s)
+        self._carrier = PositionCarrier(camera, parameters.pose_gap_limit_s, safety_map)
+        self._pictures = PictureWatch()
+        self._pending: deque[Heatmap] = deque()
+        self._depths: deque[DepthImage] = deque(maxlen=_PENDING_LIMIT)
+        self._newest_depth_ns = -1
+        self._waiting_since_ns: dict[int, int] = {}
+        self._clock_ns: int | None = None
+        self.counts: Counter[str] = Counter()
+        """Heatmaps by fate: `used`, or the reason of a rejection."""
+        self._last_rejection = self._drop_reason = ''
+        self.drops = 0
+        """How often the map was dropped; what was concluded from it is void then."""
+
+    @property
+    def last_rejection(self) -> str:
+        """Why there is no newer map: why it was dropped, or the last heatmap rejected."""
+        return self._drop_reason or self._last_rejection
+
+    def clear(self) -> None:
+        """Forget poses and waiting heatmaps; counts stay."""
+        self._poses.clear()
+        self._carrier.clear()
+        self._pending.clear()
+        self._depths.clear()
+        self._newest_depth_ns = -1
+        self._waiting_since_ns.clear()
+        self._clock_ns = None
+
+    def add_pose(self, pose: Pose) -> None:
+        """Keep a pose and use the heatmaps that waited for it.
+
+        While north and east are NaN only attitude and altitude are known.
+        """
+        if not pose.has_position:
+            kept = self._carrier.add_pose(pose)
+        else:
+            before = self._poses.newest
+            kept = self._poses.add(pose)
+            if kept and before is not None:
+                self._watch_jump(before, pose)
+            kept = kept and self._carrier.add_pose(pose)
+        if not kept:
+            self.counts['pose rejected'] += 1
+            return
+        self._settle()
+
+    def add_view(self, frame: Frame) -> None:
+        """Keep the picture of a frame, so that it can stand in for the position."""
+        if self._carrier.add_view(frame):
+            self._settle()
+
+    def _watch_jump(self, before: Pose, pose: Pose) -> None:
+        jumped_m = jump_m(before, pose)
+        if jumped_m == 0.0:
+            return
+        self._drop_map(f'the position jumped by {jumped_m:.1f} m')
+        # Heatmaps still on their way belong to the frame of before.
+        self._poses.clear()
+        self._poses.add(pose)
+
+    def _drop_map(self, reason: str) -> None:
+        self._carrier.forget_way()
+        if self._map.stamp_ns is None:
+            return
+        self._map.clear()
+        self.drops += 1
+        self.counts['map dropped'] += 1
+        self._drop_reason = f'{reason}, so the map was dropped'
+
+    def add_heatmap(self, heatmap: Heatmap) -> None:
+        """Use a heatmap, let it wait for its pose, or reject it."""
+        newest_ns = self._pending[-1].stamp_ns if self._pending else self._map.stamp_ns
+        if not np.isfinite(heatmap.safety).all():
+            self._reject('not finite')
+        elif newest_ns is not None and heatmap.stamp_ns <= newest_ns:
+            self._reject('not newer than the last')
+        elif self._clock_ns is not None and self._is_future(heatmap, self._clock_ns):
+            self._reject('stamp in the future')
+        else:
+            self._pending.append(heatmap)
+            if len(self._pending) > _PENDING_LIMIT:
+                self._drop('overtaken while it waited for a pose')
+            self._settle()
+
+    def add_depth(self, depth: DepthImage) -> None:
+        """Use a depth image, or let it wait for its pose; the oldest waits in vain."""
+        if depth.stamp_ns <= self._newest_depth_ns:
+            self.counts['depth not newer than the last'] += 1
+            return
+        self._newest_depth_ns = depth.stamp_ns
+        self._depths.append(depth)
+        self._settle()
+
+    def tick(self, now_ns: int) -> None:
+        """Tell the time: heatmaps that have waited too long, or that lie ahead, are rejected."""
+        self._clock_ns = now_ns
+        limit_ns = round(self._p.pose_wait_limit_s * 1e9)
+        while self._pending and self._is_future(self._pending[-1], now_ns):
+            self._forget_wait(self._pending.pop())
+            self._reject('stamp in the future')
+        while self._pending:
+            since_ns = self._waiting_since_ns.setdefault(self._pending[0].stamp_ns, now_ns)
+            if now_ns - since_ns <= limit_ns:
+                break
+            self._drop(Miss.NOT_YET.value)
+        self._watch_position(now_ns)
+
+    def _watch_position(self, now_ns: int) -> None:
+        newest = self._poses.newest
+        told_ns = max(0 if newest is None else newest.stamp_ns, self._carrier.newest_ns or 0)
+        gap_s = (now_ns - told_ns) * 1e-9
+        if gap_s > self._map.parameters.position_gap_limit_s:
+            self._drop_map(f'no position for {gap_s:.1f} s')
+
+    def _is_future(self, heatmap: Heatmap, now_ns: int) -> bool:
+        return heatmap.stamp_ns > now_ns + round(self._p.future_tolerance_s * 1e9)
+
+    def _pose_at(self, stamp_ns: int) -> Pose | Miss:
+        pose = self._poses.at(stamp_ns)
+        if not self._carrier.is_carrying:
+            return pose
+        # A position that has come back counts once pictures have confirmed it.
+        before_gap = isinstance(pose, Pose) and stamp_ns < (self._carrier.newest_ns or 0)
+        return pose if before_gap else self._carrier.at(stamp_ns)
+
+    def _settle(self) -> None:
+        lost = self._carrier.settle(self._poses)
+        if lost:
+            self._drop_map(lost)
+            self._poses.clear()
+        self._settle_depths()
+        while self._pending:
+            pose = self._pose_at(self._pending[0].stamp_ns)
+            if pose is Miss.NOT_YET:
+                return
+            if isinstance(pose, Miss):
+                self._drop(pose.value)
+                continue
+            heatmap = self._pending.popleft()
+            self._forget_wait(heatmap)
+            problem = self._pictures.problem(heatmap, pose)
+            if problem:
+                self._reject(problem)
+                continue
+            try:
+                self._map.add(heatmap, self._camera, pose)
+            except ImageError:
+                self._reject('values outside of 0 to 1')
+            except RefusedLookError as refusal:
+                self._reject(refusal.fate)
+            else:
+                self.counts['used'] += 1
+                self._drop_reason = ''
+
+    def _settle_depths(self) -> None:
+        while self._depths:
+            pose = self._pose_at(self._depths[0].stamp_ns)
+            if pose is Miss.NOT_YET:
+                return
+            depth = self._depths.popleft()
+            fate = 'depth used'
+            if isinstance(pose, Miss):
+                fate = f'depth: {pose.value}'
+            else:
+                try:
+                    self._map.add_depth(depth, self._camera, pose)
+                except RefusedLookError as refusal:
+                    fate = f'depth {refusal.fate}'
+            self.counts[fate] += 1
+
+    def _drop(self, reason: str) -> None:
+        self._forget_wait(self._pending.popleft())
+        self._reject(reason)
+
+    def _forget_wait(self, heatmap: Heatmap) -> None:
+        self._waiting_since_ns.pop(heatmap.stamp_ns, None)
+
+    def _reject(self, reason: str) -> None:
+        self.counts[reason] += 1
+        self._last_rejection = reason

@@ -1,0 +1,171 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What must be true before anything moves: control, telemetry, heatmaps, budgets."""
+
+from __future__ import annotations
+
+from math import hypot, isfinite
+
+from peace_ros.core.domain import Pose, Telemetry
+from peace_ros.core.landing.parameters import LandingParameters
+
+_NS = 1e-9
+_AT_ALTITUDE = 0.98
+"""An altitude counts as reached at this part of it."""
+
+
+def valid_pose(telemetry: Telemetry | None, parameters: LandingParameters) -> Pose | None:
+    """Return the pose of telemetry when it can be believed."""
+    pose = None if telemetry is None else telemetry.pose
+    if pose is None:
+        return None
+    numbers = (pose.north_m, pose.east_m, pose.altitude_agl_m)
+    if not all(isfinite(number) for number in numbers):
+        return None
+    return pose if 0.0 < pose.altitude_agl_m <= parameters.altitude_limit_m else None
+
+
+def at_safe_altitude(pose: Pose | None, parameters: LandingParameters) -> bool:
+    """Tell whether lateral motion meets no obstacle here."""
+    if pose is None:
+        return False
+    return pose.altitude_agl_m >= _AT_ALTITUDE * parameters.safe_altitude_m
+
+
+class ControlWatch:
+    """Notices when somebody else takes over; one per engagement."""
+
+    def __init__(self) -> None:
+        self._had_control = self._was_armed = False
+        self.taken_over = ''
+        """Why the vehicle is no longer ours; never emptied again."""
+
+    def see(self, telemetry: Telemetry | None) -> None:
+        """Look at telemetry, even old: a take-over that was said once is believed."""
+        if telemetry is None or self.taken_over:
+            return
+        if self._had_control and not telemetry.in_control:
+            self.taken_over = (
+                f'the autopilot went to mode {telemetry.mode or "unknown"} unasked: '
+                'a pilot or a failsafe flies now'
+            )
+        elif self._was_armed and not telemetry.armed:
+            self.taken_over = 'the vehicle was disarmed'
+        self._had_control |= telemetry.in_control and telemetry.armed
+        self._was_armed |= telemetry.armed
+
+
+def bad_telemetry(telemetry: Telemetry | None, age_s: float, parameters: LandingParameters) -> str:
+    """Return what is wrong with telemetry in a sentence, empty when it can be trusted."""
+    p = parameters
+    if telemetry is None or telemetry.pose is None:
+        silent = 'the autopilot has not said where it is: check its streams'
+        return silent if telemetry is None else telemetry.position_problem or silent
+    if not age_s <= p.telemetry_age_limit_s:
+        return f'telemetry is {age_s:.1f} s old, limit {p.telemetry_age_limit_s:.1f} s'
+    pose = telemetry.pose
+    if valid_pose(telemetry, p) is None:
+        return (
+            f'position {pose.north_m:.1f}, {pose.east_m:.1f} m at {pose.altitude_agl_m:.1f} m '
+            f'above ground is not valid: altitude must lie within 0 to {p.altitude_limit_m:.0f} m'
+        )
+    if not telemetry.armed or telemetry.landed:
+        return 'the vehicle is not in the air'
+    if not telemetry.in_control:
+        return f'the autopilot obeys mode {telemetry.mode or "unknown"}, not us'
+    return ''
+
+
+def bad_map(map_age_s: float, last_rejection: str, parameters: LandingParameters) -> str:
+    """Return what is wrong with the stream of heatmaps, empty when it can be trusted."""
+    limit = parameters.heatmap_age_limit_s
+    if map_age_s <= limit:
+        return ''
+    why = f'; the last one was rejected: {last_rejection}' if last_rejection else ''
+    if not isfinite(map_age_s):
+        return f'no heatmap has come yet{why}'
+    return f'the newest heatmap is {map_age_s:.1f} s old, limit {limit:.1f} s{why}'
+
+
+class Budget:
+    """Counts what an engagement uses up: time, way, attempts and battery."""
+
+    def __init__(self, parameters: LandingParameters) -> None:
+        self._p = parameters
+        self._begun_ns: int | None = None
+        self._last_ns = 0
+        self._spent_ns = 0
+        self._last_at: tuple[float, float] | None = None
+        self._ever_site = False
+        self._policy_done = False
+        self.without_site_s = 0.0
+        """Time since a site was last known, counted while one is looked for."""
+        self.search_m = 0.0
+        """Way flown in search."""
+        self.attempts = 0
+        """Descents that failed."""
+        self.outcome = ''
+        """`no_zone`, `timeout` or `battery` once one of them is used up."""
+        self.reason = ''
+        """Which one, in words."""
+
+    def spend(
+        self, now_ns: int, telemetry: Telemetry | None, *, looking: bool, site_known: bool
+    ) -> None:
+        """Tell the time; ``looking`` is whether a site is looked for with good data."""
+        if self._begun_ns is None:
+            self._begun_ns = self._last_ns = now_ns
+        elapsed_s = max(0.0, (now_ns - self._last_ns) * _NS)
+        self._last_ns = max(now_ns, self._last_ns)
+        self._ever_site |= site_known
+        self._measure_way(telemetry, looking=looking)
+        if site_known:
+            self.without_site_s = 0.0
+        elif looking:
+            self.without_site_s += elapsed_s
+        if not self.outcome:
+            self.outcome, self.reason = self._used_up(telemetry)
+            self._spent_ns = self._last_ns
+
+    def fail_attempt(self) -> None:
+        """Count a descent that failed; after the budget it was the last one."""
+        self.attempts += 1
+        if self.outcome:
+            self.finish_policy()
+
+    def finish_policy(self) -> None:
+        """The policy for a used-up budget has nothing more to do."""
+        self._policy_done = True
+
+    @property
+    def policy_open(self) -> bool:
+        """Something other than to hold is still to be done; False while nothing is used up."""
+        if not self.outcome or self._policy_done or self._p.budget_policy == 'hold':
+            return False
+        return (self._last_ns - self._spent_ns) * _NS <= self._p.policy_time_s
+
+    def _measure_way(self, telemetry: Telemetry | None, *, looking: bool) -> None:
+        pose = valid_pose(telemetry, self._p)
+        at = None if pose is None or not looking else (pose.north_m, pose.east_m)
+        if at is not None and self._last_at is not None:
+            self.search_m += hypot(at[0] - self._last_at[0], at[1] - self._last_at[1])
+        self._last_at = at
+
+    def _used_up(self, telemetry: Telemetry | None) -> tuple[str, str]:
+        p = self._p
+        total_s = (self._last_ns - (self._begun_ns or 0)) * _NS
+        battery = None if telemetry is None else telemetry.battery_remaining
+        if self.attempts >= p.max_attempts:
+            return 'no_zone', f'{self.attempts} descents failed, limit {p.max_attempts}'
+        if self.without_site_s > p.max_search_s:
+            return 'no_zone', f'no safe place was found in {p.max_search_s:.0f} s of searching'
+        if self.search_m > p.search_distance_m:
+            way = f'no safe place was found on {p.search_distance_m:.0f} m of searching'
+            return 'no_zone', way
+        # Written so that a battery that is no number is no battery that is full.
+        if p.battery_reserve > 0.0 and battery is not None and not battery > p.battery_reserve:
+            return 'battery', f'battery at {battery:.0%}, reserve {p.battery_reserve:.0%}'
+        if total_s > p.max_total_s:
+            outcome = 'timeout' if self._ever_site else 'no_zone'
+            return outcome, f'not landed within {p.max_total_s:.0f} s'
+        return '', ''

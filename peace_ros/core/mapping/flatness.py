@@ -1,0 +1,137 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Is the ground flat? What a depth camera measures closes ground that is rough; it never opens any.
+
+The heights of the measured points spread, within the width of a vehicle, by a standard deviation:
+the smoothness of DOVESEI, but of heights instead of depths, so that a camera that leans finds level
+ground as flat as one that does not.
+"""
+
+from __future__ import annotations
+
+from math import ceil
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from peace_ros.core.domain import Camera, DepthImage, Pose
+from peace_ros.core.domain.geometry import rotation_matrix
+from peace_ros.core.mapping.parameters import MapParameters
+from peace_ros.core.mapping.projection import GroundGrid
+from peace_ros.core.mapping.shifting import shifted
+
+_LARGEST_PX = 160
+"""Larger pictures are read at every second, third, ... pixel."""
+_FEWEST_PX = 3
+_LEAST_KNOWN = 0.5
+"""Part of the pixels of a window that must have been measured."""
+
+
+def rough_and_flat(
+    depth: DepthImage, camera: Camera, pose: Pose, grid: GroundGrid, parameters: MapParameters
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which cells of a grid are rough, and which are flat; the others were not measured.
+
+    :param camera: that of the full frame; the depth image covers it.
+    :param pose: where the camera was at the stamp of the depth image.
+    """
+    offsets, known = _points(depth, camera, pose, parameters.depth_range_m)
+    rough = np.zeros((grid.rows, grid.columns), np.bool_)
+    flat = rough.copy()
+    if not known.any():
+        return rough, flat
+    width = _window_px(offsets, known, parameters.flat_width_m)
+    spread, enough = _spread_m(offsets[2], known, width)
+    row = np.floor((pose.north_m + offsets[0] - grid.south_m) / grid.cell_m)
+    column = np.floor((pose.east_m + offsets[1] - grid.west_m) / grid.cell_m)
+    inside = (row >= 0) & (row < grid.rows) & (column >= 0) & (column < grid.columns)
+    told = known & enough & inside
+    for cells, chosen in (
+        (rough, told & (spread > parameters.depth_smoothness_m)),
+        (flat, told & (spread <= parameters.depth_smoothness_m)),
+    ):
+        cells[row[chosen].astype(np.intp), column[chosen].astype(np.intp)] = True
+    # Points may lie farther apart than cells.
+    grown = cv2.dilate(rough.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    return grown, flat & ~grown
+
+
+def _points(
+    depth: DepthImage, camera: Camera, pose: Pose, range_m: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return north, east and down of the camera (3 x H x W) of each point, and which are known."""
+    height, width = depth.depth_m.shape
+    step = max(1, ceil(max(height, width) / _LARGEST_PX))
+    rows, columns = np.arange(step // 2, height, step), np.arange(step // 2, width, step)
+    along = depth.depth_m[np.ix_(rows, columns)].astype(np.float64)
+    # A sensor that sees nothing, or no farther, says zero, infinity, or its range.
+    known = np.isfinite(along) & (along > 0.0) & (along < range_m)
+    along = np.where(known, along, 0.0)
+    scaled = camera.resized(width, height)
+    cu, cv = scaled.centre_px
+    right = (columns[None, :] - cu) / scaled.focal_px * along
+    forward = -(rows[:, None] - cv) / scaled.focal_px * along
+    body = np.stack((forward, right, along))
+    return np.tensordot(rotation_matrix(pose.quaternion_ned_frd), body, axes=1), known
+
+
+def _window_px(
+    offsets: NDArray[np.float64], known: NDArray[np.bool_], width_m: float
+) -> tuple[int, int]:
+    """Return how many points (across, along) lie within a width on the ground."""
+    sizes = []
+    for axis in (1, 0):
+        both = known & np.roll(known, -1, axis)
+        apart = np.linalg.norm(np.roll(offsets, -1, axis + 1)[:2] - offsets[:2], axis=0)
+        step_m = float(np.median(apart[both])) if both.any() else width_m
+        sizes.append(max(_FEWEST_PX, round(width_m / max(step_m, 1e-3))))
+    return sizes[0], sizes[1]
+
+
+def _spread_m(
+    down_m: NDArray[np.float64], known: NDArray[np.bool_], window_px: tuple[int, int]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the standard deviation of the heights around each point, and where enough is known."""
+    # Around their middle, or the squares of the heights would lose what they differ by.
+    height = np.where(known, down_m - np.median(down_m[known]), 0.0)
+
+    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(cv2.blur(values, window_px, borderType=cv2.BORDER_CONSTANT))
+
+    share = mean(known.astype(np.float64))
+    enough = share >= _LEAST_KNOWN * mean(np.ones_like(height))
+    safe_share = np.maximum(share, 1e-9)
+    average = mean(height) / safe_share
+    variance = mean(height * height) / safe_share - average * average
+    return np.sqrt(np.maximum(variance, 0.0)), enough
+
+
+class Roughness:
+    """Which cells were rough when they were measured last."""
+
+    def __init__(self, cells: int) -> None:
+        self._cells = cells
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._rough = np.zeros((self._cells, self._cells), np.bool_)
+
+    def shift(self, d_row: int, d_column: int) -> None:
+        """Follow the window of the map by whole cells."""
+        self._rough = shifted(self._rough, d_row, d_column, 0.0)
+
+    def widen(self, kernel: NDArray[np.uint8]) -> None:
+        """Let rough cells grow."""
+        self._rough = cv2.dilate(self._rough.astype(np.uint8), kernel) > 0
+
+    def take(self, rough: NDArray[np.bool_], flat: NDArray[np.bool_]) -> None:
+        """Take one look; what it did not measure stays."""
+        self._rough |= rough
+        self._rough &= ~flat
+
+    def closed(self, rows: slice, columns: slice) -> NDArray[np.bool_]:
+        """Return which cells are rough."""
+        rough: NDArray[np.bool_] = self._rough[rows, columns]
+        return rough

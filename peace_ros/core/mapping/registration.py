@@ -1,0 +1,277 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How far a camera moved between two pictures of the ground, told from the pictures alone.
+
+Both pictures are laid onto level ground with their own attitude and altitude, which takes
+rotation, tilt and scale out of them; what remains is a shift, found by phase correlation (Kuglin
+and Hines, 1975). A shift is believed only when one peak stands out, when the pictures agree after
+it, and when they have texture at all; otherwise the answer is a reason.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from functools import lru_cache
+from math import hypot, isfinite, radians
+from typing import cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from peace_ros.core.domain import Camera, Pose
+from peace_ros.core.domain.geometry import footprint_m, ground_to_image, image_to_ground
+from peace_ros.core.mapping.projection import tilt_rad
+
+PATCH_PX = 128
+"""Edge of the patches of ground that are compared."""
+_PATCH_PARTS = (0.9, 0.75, 0.6, 0.45)
+"""Edges of patches to try, in footprints of the lower camera."""
+_LARGEST_ALTITUDE_RATIO = 1.6
+_LARGEST_TILT_RAD = radians(45.0)
+_LARGEST_SHIFT = 0.35
+"""Of the patch; beyond, too little overlaps."""
+_LEAST_TEXTURE = 3.0
+"""Standard deviation in grey levels."""
+_LEAST_CROSS_TEXTURE = 0.03
+"""Gradients across over those along the main direction: nothing tells motion along stripes."""
+_LEAST_PEAK_RATIO = 1.6
+"""The best peak over the second best: ploughed rows and parking lots look alike everywhere."""
+_LEAST_CORRELATION = 0.5
+_PEAK_RADIUS_PX = 6
+_PASSBAND = 0.2
+"""Cycles per pixel at which the weight of a frequency has fallen to 0.6: above is noise."""
+_ERROR_PX = 0.3
+_ERROR_PER_ALTITUDE = 0.005
+"""Attitude errs by 0.3 deg between two pictures."""
+_ERROR_PER_DISTANCE = 0.02
+"""Altitude, and with it the scale, errs by 2 %."""
+VIEW_PX = 256
+"""Longer edge of the pictures that are kept."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A small grey picture and how the camera was turned."""
+
+    grey: NDArray[np.uint8]
+    """Height x width; the whole frame."""
+    pose: Pose
+    """Attitude and altitude count, position does not."""
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """How far the camera moved, in the local NED frame."""
+
+    north_m: float
+    east_m: float
+    error_m: float
+    """One standard deviation, by the resolution, the altitude and the distance."""
+    correlation: float
+    """How well the pictures agree after the shift, up to 1."""
+
+
+class Mismatch(Enum):
+    """Why two pictures do not tell how far the camera moved."""
+
+    SAME = 'the camera gave the same picture twice'
+    ALTITUDE = 'the altitudes of the pictures differ too much'
+    HORIZON = 'the camera leans too far for level ground'
+    TEXTURE = 'the ground has too little texture'
+    AMBIGUOUS = 'the ground looks alike in several places'
+    FAR = 'too little of the ground is in both pictures'
+    DIFFERENT = 'the pictures do not agree'
+
+
+def small_grey(image_rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a height x width x 3 RGB image as a grey one whose longer edge is VIEW_PX at most."""
+    grey = cv2.cvtColor(image_rgb, cv2.COLOR_RGB2GRAY)
+    height, width = grey.shape
+    scale = VIEW_PX / max(height, width)
+    if scale < 1.0:
+        size = (max(1, round(width * scale)), max(1, round(height * scale)))
+        grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
+    return cast('NDArray[np.uint8]', grey)
+
+
+def register(before: View, after: View, camera: Camera) -> Displacement | Mismatch:
+    """Return how far the camera moved from one view to the other, or why it cannot be told.
+
+    :param camera: that of the full frames.
+    """
+    if before.grey.shape == after.grey.shape and np.array_equal(before.grey, after.grey):
+        return Mismatch.SAME
+    altitudes_m = before.pose.altitude_agl_m, after.pose.altitude_agl_m
+    lower_m = min(altitudes_m)
+    known = all(isfinite(each) and each > 0.0 for each in altitudes_m)
+    if not known or max(altitudes_m) > _LARGEST_ALTITUDE_RATIO * lower_m:
+        return Mismatch.ALTITUDE
+    if max(tilt_rad(before.pose), tilt_rad(after.pose)) > _LARGEST_TILT_RAD:
+        return Mismatch.HORIZON
+    width_m = min(footprint_m(camera, lower_m))
+    first_middle, second_middle = _middle(before, camera), _middle(after, camera)
+    if first_middle is None or second_middle is None:
+        return Mismatch.HORIZON
+    shared = 0.5 * (first_middle + second_middle)
+    # Around the same point seen from the vehicle only its motion is left to be found.
+    for at in ((shared, shared), (first_middle, second_middle)):
+        for part in _PATCH_PARTS:
+            edge_m = part * width_m
+            first = _patch(before, camera, at[0], edge_m)
+            second = _patch(after, camera, at[1], edge_m)
+            if first is not None and second is not None:
+                return _compare(first, second, edge_m, lower_m)
+    return Mismatch.HORIZON
+
+
+@dataclass(frozen=True)
+class _Patch:
+    """A square of level ground, north up."""
+
+    ground: NDArray[np.float32]
+    """PATCH_PX x PATCH_PX grey levels."""
+    north_m: float
+    """Of its middle, from the point below the camera."""
+    east_m: float
+
+
+def _seen_by(view: View, camera: Camera) -> tuple[Camera, Pose]:
+    """Return the camera of the small picture, and its pose above the origin."""
+    height, width = view.grey.shape
+    pose = Pose(0, 0.0, 0.0, 0.0, view.pose.quaternion_ned_frd, view.pose.altitude_agl_m)
+    return camera.resized(width, height), pose
+
+
+def _middle(view: View, camera: Camera) -> NDArray[np.float64] | None:
+    """Return (north, east) metres of the ground in the middle of the picture, None above it."""
+    small, pose = _seen_by(view, camera)
+    middle = image_to_ground(small, pose) @ np.array([*small.centre_px, 1.0])
+    if not middle[2] > 0.0:
+        return None
+    ground: NDArray[np.float64] = middle[:2] / middle[2]
+    return ground
+
+
+def _patch(view: View, camera: Camera, middle: NDArray[np.float64], edge_m: float) -> _Patch | None:
+    """Cut a square of ground out of the picture; None when it is not all in view."""
+    small, pose = _seen_by(view, camera)
+    north_m, east_m = float(middle[0]), float(middle[1])
+    cell_m, half = edge_m / PATCH_PX, 0.5 * (PATCH_PX - 1)
+    ground_from_patch = np.array(
+        [
+            [0.0, -cell_m, north_m + half * cell_m],
+            [cell_m, 0.0, east_m - half * cell_m],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    matrix = ground_to_image(small, pose) @ ground_from_patch
+    last = PATCH_PX - 1.0
+    u, v, depth = matrix @ np.array([[0, last, last, 0], [0, 0, last, last], [1, 1, 1, 1]])
+    if not np.all(depth > 0.0):
+        return None
+    u, v = u / depth, v / depth
+    if (
+        min(u.min(), v.min()) < 0.0
+        or u.max() > small.width_px - 1.0
+        or v.max() > small.height_px - 1.0
+    ):
+        return None
+    ground = cv2.warpPerspective(
+        view.grey,
+        matrix,
+        (PATCH_PX, PATCH_PX),
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+    )
+    smooth = cv2.GaussianBlur(ground.astype(np.float32), (0, 0), 1.0)
+    return _Patch(cast('NDArray[np.float32]', smooth), north_m, east_m)
+
+
+def _compare(
+    first: _Patch, second: _Patch, edge_m: float, altitude_m: float
+) -> Displacement | Mismatch:
+    if min(first.ground.std(), second.ground.std()) < _LEAST_TEXTURE:
+        return Mismatch.TEXTURE
+    if min(_cross_texture(first.ground), _cross_texture(second.ground)) < _LEAST_CROSS_TEXTURE:
+        return Mismatch.AMBIGUOUS
+    down_px, right_px, ratio = _shift(first.ground, second.ground)
+    if hypot(down_px, right_px) > _LARGEST_SHIFT * PATCH_PX:
+        return Mismatch.FAR
+    if ratio < _LEAST_PEAK_RATIO:
+        return Mismatch.AMBIGUOUS
+    agreement = _agreement(first.ground, second.ground, round(down_px), round(right_px))
+    if agreement < _LEAST_CORRELATION:
+        return Mismatch.DIFFERENT
+    # The same ground lies in both: camera + middle of its patch + place in the patch.
+    cell_m = edge_m / PATCH_PX
+    north_m = first.north_m - second.north_m - down_px * cell_m
+    east_m = first.east_m - second.east_m + right_px * cell_m
+    error_m = (
+        _ERROR_PX * cell_m
+        + _ERROR_PER_ALTITUDE * altitude_m
+        + _ERROR_PER_DISTANCE * hypot(north_m, east_m)
+    )
+    return Displacement(north_m, east_m, error_m, agreement)
+
+
+def _cross_texture(ground: NDArray[np.float32]) -> float:
+    """Return the smaller over the larger eigenvalue of the structure tensor, 0 to 1."""
+    down, right = np.gradient(ground)
+    mixed = float((down * right).mean())
+    tensor = np.array(
+        [[float((down * down).mean()), mixed], [mixed, float((right * right).mean())]]
+    )
+    small, large = np.linalg.eigvalsh(tensor)
+    return float(small / max(large, 1e-9))
+
+
+@lru_cache(maxsize=1)
+def _window() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the taper of a patch, and the weight of each frequency."""
+    taper = cv2.createHanningWindow((PATCH_PX, PATCH_PX), cv2.CV_32F)
+    down, right = np.fft.fftfreq(PATCH_PX), np.fft.rfftfreq(PATCH_PX)
+    weight = np.exp(-(np.add.outer(down**2, right**2)) / (2.0 * _PASSBAND**2))
+    weight[0, 0] = 0.0
+    return cast('NDArray[np.float32]', taper), weight.astype(np.float32)
+
+
+def _shift(first: NDArray[np.float32], second: NDArray[np.float32]) -> tuple[float, float, float]:
+    """Return rows and columns by which the second is ahead, and how far one peak stands out.
+
+    What lies at (row, column) of the second lies at (row + rows, column + columns) of the first.
+    """
+    taper, weight = _window()
+    spectra = [np.fft.rfft2((each - each.mean()) * taper) for each in (first, second)]
+    cross = spectra[0] * np.conj(spectra[1])
+    cross *= weight / np.maximum(np.abs(cross), 1e-9)
+    surface = np.fft.fftshift(np.fft.irfft2(cross, s=first.shape))
+    row, column = (int(each) for each in np.unravel_index(int(surface.argmax()), surface.shape))
+    best = float(surface[row, column])
+    rest = surface.copy()
+    near = _PEAK_RADIUS_PX
+    rest[max(0, row - near) : row + near + 1, max(0, column - near) : column + near + 1] = 0.0
+    ratio = best / max(float(rest.max()), 1e-9)
+    down = row + _vertex(surface[:, column], row) - PATCH_PX // 2
+    right = column + _vertex(surface[row], column) - PATCH_PX // 2
+    return down, right, ratio
+
+
+def _vertex(values: NDArray[np.float64], at: int) -> float:
+    """Return where the parabola through a peak and its two neighbours is highest, -0.5 to 0.5."""
+    before, peak, after = (float(values[(at + step) % values.size]) for step in (-1, 0, 1))
+    curvature = before - 2.0 * peak + after
+    return 0.0 if curvature >= 0.0 else 0.5 * (before - after) / curvature
+
+
+def _agreement(
+    first: NDArray[np.float32], second: NDArray[np.float32], down_px: int, right_px: int
+) -> float:
+    """Return the correlation of the ground that is in both patches, -1 to 1."""
+    one = first[max(0, down_px) : PATCH_PX + min(0, down_px)]
+    other = second[max(0, -down_px) : PATCH_PX + min(0, -down_px)]
+    one = one[:, max(0, right_px) : PATCH_PX + min(0, right_px)]
+    other = other[:, max(0, -right_px) : PATCH_PX + min(0, -right_px)]
+    one, other = one - one.mean(), other - other.mean()
+    size = float(np.sqrt((one * one).sum() * (other * other).sum()))
+    return 0.0 if size < 1e-6 else float((one * other).sum()) / size

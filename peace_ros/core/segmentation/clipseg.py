@@ -1,0 +1,147 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""CLIPSeg: the image is encoded once per look and decoded once for all terms together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from peace_ros.core.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
+from peace_ros.core.inference import Bundle, Preprocessor
+from peace_ros.core.inference.contract import IS_POSITIVE, PIXEL_VALUES, TERM_LOGITS, TEXT_EMBEDDING
+from peace_ros.core.segmentation.fusion import calibrated
+from peace_ros.core.segmentation.looks import joined, parts_of
+from peace_ros.core.segmentation.segmenter import BundleSegmenter, SegmentationParameters
+from peace_ros.core.segmentation.terms import Terms
+
+Image = NDArray[np.uint8]
+Scores = NDArray[np.float32]
+
+_ROUNDING = 1e-3
+"""How far beyond 0 and 1 a score may lie, from arithmetic in fp16 or int8."""
+
+
+class ClipSegSegmenter(BundleSegmenter):
+    """A Segmenter over a bundle of the family ``clipseg``."""
+
+    def __init__(self, bundle: Bundle, terms: Terms, parameters: SegmentationParameters) -> None:
+        """Open the bundle's graphs and run them once.
+
+        Args:
+            bundle: of the family ``clipseg``.
+            terms: what to look for.
+            parameters: of the segmentation; its bundle and terms are those given here.
+
+        Raises:
+            BundleError: the bundle is of another family or its graphs do not fit it.
+            ConfigurationError: an execution provider is not available, or softmax is asked for
+                without a negative term.
+        """
+        if parameters.fusion == 'softmax' and not terms.negative:
+            raise ConfigurationError(
+                'fusion softmax without negative terms would call everything safe: '
+                'name negative terms or choose set_difference'
+            )
+        bundle.require_family('clipseg')
+        self._threshold = _threshold(bundle, parameters.fusion)
+        super().__init__(bundle, ('image_encoder', 'text_encoder', 'decoder'), terms, parameters)
+        self._preprocess = Preprocessor(bundle.manifest.input)
+        self._features = [each.name for each in self._sessions['image_encoder'].graph.outputs]
+        self._is_positive = np.array(
+            [1.0] * len(terms.positive) + [0.0] * len(terms.negative), np.float32
+        )
+        self._warm_up(bundle)
+        self._loaded()
+
+    def _warm_up(self, bundle: Bundle) -> None:
+        size = bundle.manifest.input
+        blank = np.zeros((size.height, size.width, 3), np.uint8)
+        encoder = self._sessions['image_encoder']
+        features = encoder.warm_up(self._features, {PIXEL_VALUES: self._preprocess(blank)})
+        texts = np.zeros((len(self._terms), bundle.manifest.embedding_width), np.float32)
+        self._sessions['decoder'].warm_up(self._fusion.outputs, self._feeds(features, texts))
+
+    def segment(self, frame: Frame, prompt: Prompt) -> Heatmap:
+        """Return the safety of each pixel, with the frame's stamp.
+
+        It has the resolution of the network, times the parts that the frame is looked at in. 0.5
+        is the score from which the bundle recommends to call ground safe.
+
+        Raises ImageError for an image that cannot be used, BundleError for an answer of the
+        network that cannot be used.
+        """
+        texts = self._embeddings(prompt)
+        (safety,) = self._closely(frame, lambda image: self._safety(image, texts))
+        return Heatmap(calibrated(safety, self._threshold), frame.stamp_ns)
+
+    def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
+        """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``."""
+        texts = self._embeddings(prompt)
+        maps = self._closely(frame, lambda image: self._chances(image, texts))
+        return np.stack(maps)
+
+    def _closely(self, frame: Frame, see: Callable[[Image], list[Scores]]) -> list[Scores]:
+        """Return the maps that are seen in the frame, each of the whole and of its parts."""
+        image, size = frame.image_rgb, self._manifest.input
+        parts = parts_of(
+            (image.shape[1], image.shape[0]),
+            (size.width, size.height),
+            self._parameters.clipseg_max_looks,
+        )
+        whole = see(image)
+        answers = [see(part.of(image)) for part in parts]
+        return [
+            joined(each, [answer[index] for answer in answers], parts)
+            for index, each in enumerate(whole)
+        ]
+
+    def _safety(self, image_rgb: Image, texts: Scores) -> list[Scores]:
+        maps = self._decode(image_rgb, texts, self._fusion.outputs)
+        return [self._fusion.combine(*(self._checked(each) for each in maps))]
+
+    def _chances(self, image_rgb: Image, texts: Scores) -> list[Scores]:
+        (logits,) = self._decode(image_rgb, texts, [TERM_LOGITS])
+        if logits.ndim != 3 or logits.shape[0] != len(self._terms):
+            raise self._unusable('decoder', f'{TERM_LOGITS} of shape {logits.shape}')
+        if not np.isfinite(logits).all():
+            raise self._unusable('decoder', f'{TERM_LOGITS} that are not finite')
+        # tanh never overflows, where exp would.
+        maps: Scores = 0.5 * np.tanh(0.5 * logits) + 0.5
+        return list(maps)
+
+    def _decode(self, image_rgb: Image, texts: Scores, outputs: Sequence[str]) -> list[Scores]:
+        feeds = {PIXEL_VALUES: self._preprocess(image_rgb)}
+        features = self._sessions['image_encoder'].run(self._features, feeds)
+        return self._sessions['decoder'].run(outputs, self._feeds(features, texts))
+
+    def _feeds(self, features: Sequence[Scores], texts: Scores) -> dict[str, Scores]:
+        feeds = dict(zip(self._features, features, strict=True))
+        feeds[TEXT_EMBEDDING] = texts
+        feeds[IS_POSITIVE] = self._is_positive
+        return feeds
+
+    def _checked(self, scores: Scores) -> Scores:
+        """Return scores h x w clipped to 0..1; refuse what is no score at all."""
+        if scores.ndim != 2 or scores.size == 0:
+            raise self._unusable('decoder', f'scores of shape {scores.shape}')
+        low, high = float(scores.min()), float(scores.max())
+        # A comparison with NaN is false, so NaN is refused here too.
+        if not (low >= -_ROUNDING and high <= 1.0 + _ROUNDING):
+            raise self._unusable('decoder', f'scores from {low} to {high} where 0 to 1 is due')
+        return np.clip(scores, np.float32(0.0), np.float32(1.0))
+
+
+def _threshold(bundle: Bundle, fusion: str) -> float:
+    """Return the bundle's recommendation, which was measured with the set difference."""
+    if fusion != 'set_difference':
+        return 0.5
+    threshold = float(bundle.manifest.recommended.get('threshold', 0.5))
+    if not 0.0 < threshold < 1.0:
+        raise BundleError(
+            f'{bundle.folder / "manifest.json"}: recommended threshold {threshold} must lie '
+            'between 0 and 1, both excluded: correct the manifest or export the bundle anew'
+        )
+    return threshold

@@ -1,0 +1,204 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""FastSAM's segments of a frame, each scored by CLIP against every term."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from peace_ros.core.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
+from peace_ros.core.inference import Bundle
+from peace_ros.core.inference.contract import (
+    IMAGE_EMBEDDING,
+    NEGATIVE,
+    PIXEL_VALUES,
+    POSITIVE,
+    PREDICTIONS,
+    PROTOTYPES,
+    SOFTMAX_POSITIVE,
+)
+from peace_ros.core.inference.manifest import InputSpec
+from peace_ros.core.segmentation.fastsam.crops import Cutter
+from peace_ros.core.segmentation.fastsam.detections import detect
+from peace_ros.core.segmentation.fastsam.letterbox import Letterbox, Placement
+from peace_ros.core.segmentation.fastsam.masks import Segment, assemble
+from peace_ros.core.segmentation.fastsam.painting import paint
+from peace_ros.core.segmentation.fastsam.scoring import is_usable, term_shares
+from peace_ros.core.segmentation.fastsam.selection import Selection, select
+from peace_ros.core.segmentation.fusion import calibrated
+from peace_ros.core.segmentation.segmenter import BundleSegmenter, SegmentationParameters
+from peace_ros.core.segmentation.terms import Terms
+
+
+@dataclass(frozen=True)
+class _Painted:
+    """A frame divided among its segments."""
+
+    labels: NDArray[np.int32]
+    """h x w, see :func:`paint`."""
+    shares: NDArray[np.float32]
+    """[1 + N, T]; row UNKNOWN is zero."""
+    safety: NDArray[np.float32]
+    """[1 + N]; the first, of unknown ground, is zero."""
+
+
+class FastSamSegmenter(BundleSegmenter):
+    """A Segmenter over a bundle of the family ``fastsam``."""
+
+    def __init__(self, bundle: Bundle, terms: Terms, parameters: SegmentationParameters) -> None:
+        """Open the bundle's graphs and run them once.
+
+        Args:
+            bundle: of the family ``fastsam``.
+            terms: what to look for.
+            parameters: of the segmentation; its bundle and terms are those given here.
+
+        Raises:
+            BundleError: the bundle is of another family or its graphs do not fit it.
+            ConfigurationError: an execution provider is not available, or there is no negative
+                term.
+        """
+        if not terms.negative:
+            raise ConfigurationError(
+                'family fastsam without negative terms would call every segment safe, because '
+                'the terms share each segment among them: name negative terms or choose clipseg'
+            )
+        bundle.require_family('fastsam')
+        super().__init__(bundle, ('segmenter', 'image_encoder', 'text_encoder'), terms, parameters)
+        self._logit_scale = bundle.manifest.logit_scale
+        self._threshold = _threshold(bundle, parameters.fusion)
+        self._letterbox = Letterbox(bundle.manifest.input)
+        self._cutter = Cutter(bundle.manifest.encoder_input, parameters.fastsam_max_segments)
+        self._warm_up(bundle)
+        self._loaded()
+
+    def _warm_up(self, bundle: Bundle) -> None:
+        size = bundle.manifest.input
+        pixels, _ = self._letterbox(np.zeros((size.height, size.width, 3), np.uint8))
+        predictions, prototypes = self._sessions['segmenter'].warm_up(
+            [PREDICTIONS, PROTOTYPES], {PIXEL_VALUES: pixels}
+        )
+        self._cell_px = self._checked_cell_px(predictions, prototypes, size)
+        # The largest batch: no later frame then waits for memory.
+        crops = self._cutter.blank()
+        self._sessions['image_encoder'].warm_up([IMAGE_EMBEDDING], {PIXEL_VALUES: crops})
+
+    def _checked_cell_px(
+        self, predictions: NDArray[np.float32], prototypes: NDArray[np.float32], size: InputSpec
+    ) -> int:
+        """Return the input pixels per prototype cell; refuse outputs that do not go together."""
+        _, count, height, width = prototypes.shape
+        cell_px: int = size.width // max(1, width)
+        fits = (width * cell_px, height * cell_px) == (size.width, size.height)
+        if predictions.shape[1] != 5 + count or not fits:
+            raise self._unusable(
+                'segmenter',
+                f'{PREDICTIONS} {predictions.shape} and {PROTOTYPES} {prototypes.shape} for an '
+                f'input of {size.width} x {size.height} px',
+            )
+        return cell_px
+
+    def segment(self, frame: Frame, prompt: Prompt) -> Heatmap:
+        """Return the safety of each pixel at network resolution, with the frame's stamp.
+
+        0.5 is the score from which the bundle recommends to call ground safe.
+
+        Ground that no segment covers, or one that was not scored, is not known to be safe: 0.
+
+        Raises ImageError for an image that cannot be used, BundleError for an answer of the
+        networks that cannot be used.
+        """
+        painted = self._paint(frame, prompt)
+        safety = calibrated(painted.safety, self._threshold)
+        return Heatmap(safety[painted.labels], frame.stamp_ns)
+
+    def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
+        """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``.
+
+        Where segments overlap, all maps show the scores of the one that ``segment`` shows. On
+        unknown ground every term is 0.
+        """
+        painted = self._paint(frame, prompt)
+        return np.ascontiguousarray(painted.shares.T)[:, painted.labels]
+
+    def segments(self, frame: Frame) -> Selection:
+        """Return the segments of a frame without scoring them."""
+        return self._find(frame)[0]
+
+    def _find(self, frame: Frame) -> tuple[Selection, Placement]:
+        pixels, place = self._letterbox(frame.image_rgb)
+        predictions, prototypes = self._sessions['segmenter'].run(
+            [PREDICTIONS, PROTOTYPES], {PIXEL_VALUES: pixels}
+        )
+        if not (np.isfinite(predictions).all() and np.isfinite(prototypes).all()):
+            raise self._unusable('segmenter', 'boxes or masks that are not finite')
+        detections = detect(
+            predictions[0],
+            min_confidence=self._parameters.fastsam_min_confidence,
+            max_overlap=self._parameters.fastsam_max_overlap,
+        )
+        segments = assemble(detections, prototypes[0], self._cell_px, place)
+        frame_px = place.width_px * place.height_px
+        return select(segments, frame_px, self._parameters), place
+
+    def _paint(self, frame: Frame, prompt: Prompt) -> _Painted:
+        selection, place = self._find(frame)
+        terms = self._embeddings(prompt)
+        shares = self._shares(frame, selection.scored, place, terms)
+        safety = self._safety(shares)
+        if self._parameters.fastsam_overlap == 'least_safe':
+            order = np.argsort(-safety, kind='stable')
+        else:
+            order = np.arange(len(safety))  # largest first already
+        labels = paint(selection, order.tolist(), place.height_px, place.width_px)
+        return _Painted(
+            labels,
+            np.concatenate([np.zeros((1, len(self._terms)), np.float32), shares]),
+            np.concatenate([np.zeros(1, np.float32), safety]),
+        )
+
+    def _shares(
+        self, frame: Frame, segments: list[Segment], place: Placement, terms: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        if not segments:
+            return np.zeros((0, len(self._terms)), np.float32)
+        crops = self._cutter(frame.image_rgb, segments, place)
+        (embeddings,) = self._sessions['image_encoder'].run(
+            [IMAGE_EMBEDDING], {PIXEL_VALUES: crops}
+        )
+        if embeddings.shape != (len(segments), terms.shape[1]) or not is_usable(embeddings):
+            raise self._unusable('image_encoder', f'embeddings of shape {embeddings.shape}')
+        return term_shares(embeddings, terms, self._logit_scale)
+
+    def _safety(self, shares: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the fused score of each segment, [N] float32, 0 to 1."""
+        positive, negative = np.split(shares, [len(self._terms.positive)], axis=1)
+        scores = {
+            POSITIVE: positive.max(axis=1),
+            NEGATIVE: negative.max(axis=1),
+            SOFTMAX_POSITIVE: positive.sum(axis=1),
+        }
+        fused = self._fusion.combine(*(scores[name] for name in self._fusion.outputs))
+        return np.clip(fused, np.float32(0.0), np.float32(1.0))
+
+    def _embeddings(self, prompt: Prompt) -> NDArray[np.float32]:
+        texts = super()._embeddings(prompt)
+        if not is_usable(texts):
+            raise self._unusable('text_encoder', 'a text embedding of length zero')
+        return texts
+
+
+def _threshold(bundle: Bundle, fusion: str) -> float:
+    """Return the bundle's recommendation, which was measured with the sum of positive shares."""
+    if fusion != 'softmax':
+        return 0.5
+    threshold = float(bundle.manifest.recommended.get('threshold', 0.5))
+    if not 0.0 < threshold < 1.0:
+        raise BundleError(
+            f'{bundle.folder / "manifest.json"}: recommended threshold {threshold} must lie '
+            'between 0 and 1, both excluded: correct the manifest or export the bundle anew'
+        )
+    return threshold

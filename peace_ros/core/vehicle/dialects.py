@@ -1,0 +1,358 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What differs between autopilots: mode numbers, the mode that obeys set-points, its message."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import atan2, cos, hypot, sin
+from typing import Any, Protocol
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from peace_ros.core.domain.errors import VehicleError
+from peace_ros.core.domain.geometry import rotation_matrix
+from peace_ros.core.domain.motion import Pose, Setpoint
+
+VELOCITY_HOLD_HEADING = 0x5C7
+"""Type mask: use velocity and yaw rate (which is zero), ignore everything else.
+
+The mask without yaw rate (0xDC7) would turn the nose to the direction of travel.
+"""
+CUSTOM_MODE = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+
+Vector = tuple[float, float, float]
+ModeCommand = Vector
+"""The first three parameters of MAV_CMD_DO_SET_MODE."""
+
+
+class Dialect(Protocol):
+    """One autopilot's way of speaking."""
+
+    @property
+    def name(self) -> str:
+        """What a user calls it."""
+        ...
+
+    @property
+    def autopilot(self) -> int:
+        """MAV_AUTOPILOT in HEARTBEAT."""
+        ...
+
+    @property
+    def streams_before_control(self) -> bool:
+        """Set-points must flow before the mode that obeys them is entered."""
+        ...
+
+    @property
+    def control_mode(self) -> str:
+        """Name of the mode that obeys set-points."""
+        ...
+
+    @property
+    def hold_mode(self) -> str:
+        """Name of the autopilot's own mode for holding position."""
+        ...
+
+    @property
+    def land_mode(self) -> str:
+        """Name of the autopilot's own mode for landing where it is."""
+        ...
+
+    @property
+    def level_mode(self) -> str:
+        """Mode in which it keeps its height, level, without a position; empty: it has none."""
+        ...
+
+    @property
+    def estimator_message(self) -> int:
+        """Message id that tells what its position filter knows."""
+        ...
+
+    @property
+    def height_message(self) -> int:
+        """Message id of a height above home that needs no position."""
+        ...
+
+    @property
+    def home_is_local(self) -> bool:
+        """HOME_POSITION tells where home is in the local frame, not only on the globe."""
+        ...
+
+    @property
+    def heartbeat_rate_hz(self) -> float:
+        """Rate of HEARTBEAT to ask for; 0: a new mode is told at once anyway."""
+        ...
+
+    def mode_name(self, custom_mode: int) -> str:
+        """Return the autopilot's own name of a mode."""
+        ...
+
+    def mode_command(self, mode: str) -> ModeCommand:
+        """Return the parameters of MAV_CMD_DO_SET_MODE; VehicleError for an unknown mode."""
+        ...
+
+    def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
+        """Return the set-point as a message to (system, component)."""
+        ...
+
+    def landing_target_message(self, site_ned_m: Vector, pose: Pose, stamp_us: int) -> Any:
+        """Return LANDING_TARGET for a point on the ground, local NED, in a frame it takes."""
+        ...
+
+
+def _velocity_message(setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
+    return mavlink.MAVLink_set_position_target_local_ned_message(
+        boot_ms & 0xFFFFFFFF,
+        target[0],
+        target[1],
+        mavlink.MAV_FRAME_LOCAL_NED,
+        VELOCITY_HOLD_HEADING,
+        0.0,
+        0.0,
+        0.0,
+        setpoint.v_north_m_s,
+        setpoint.v_east_m_s,
+        setpoint.v_down_m_s,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
+
+
+LEVEL_HOLDS_HEIGHT = 0.5
+"""Thrust that means "climb at zero" in ArduCopter's GUIDED_NOGPS."""
+ONLY_ATTITUDE = 0x07
+"""Type mask: ignore the body rates; level attitude, heading and thrust count."""
+
+
+def level_message(yaw_rad: float, boot_ms: int, target: tuple[int, int]) -> Any:
+    """Return SET_ATTITUDE_TARGET: level, heading as given, neither climbing nor descending."""
+    return mavlink.MAVLink_set_attitude_target_message(
+        boot_ms & 0xFFFFFFFF,
+        target[0],
+        target[1],
+        ONLY_ATTITUDE,
+        [cos(yaw_rad / 2.0), 0.0, 0.0, sin(yaw_rad / 2.0)],
+        0.0,
+        0.0,
+        0.0,
+        LEVEL_HOLDS_HEIGHT,
+    )
+
+
+def _from_body(site_ned_m: Vector, pose: Pose) -> Vector:
+    """Return the way from the vehicle to a point: forward, right, down."""
+    away = (
+        site_ned_m[0] - pose.north_m,
+        site_ned_m[1] - pose.east_m,
+        site_ned_m[2] - pose.down_m,
+    )
+    body = rotation_matrix(pose.quaternion_ned_frd).T @ away
+    return float(body[0]), float(body[1]), float(body[2])
+
+
+def _landing_target(frame: int, vector: Vector, body_m: Vector, stamp_us: int) -> Any:
+    distance_m = max(0.01, hypot(*body_m))
+    forward, right, down = body_m
+    return mavlink.MAVLink_landing_target_message(
+        stamp_us,
+        0,
+        frame,
+        atan2(right, down),
+        atan2(-forward, down),
+        distance_m,
+        0.0,
+        0.0,
+        *vector,
+        [1.0, 0.0, 0.0, 0.0],
+        mavlink.LANDING_TARGET_TYPE_VISION_OTHER,
+        1,
+    )
+
+
+def _unknown_mode(mode: str, known: list[str]) -> VehicleError:
+    return VehicleError(f'mode {mode!r} is unknown: choose one of {", ".join(sorted(known))}')
+
+
+ARDUCOPTER_MODES: dict[str, int] = {
+    'STABILIZE': 0,
+    'ACRO': 1,
+    'ALT_HOLD': 2,
+    'AUTO': 3,
+    'GUIDED': 4,
+    'LOITER': 5,
+    'RTL': 6,
+    'CIRCLE': 7,
+    'LAND': 9,
+    'DRIFT': 11,
+    'SPORT': 13,
+    'FLIP': 14,
+    'AUTOTUNE': 15,
+    'POSHOLD': 16,
+    'BRAKE': 17,
+    'THROW': 18,
+    'AVOID_ADSB': 19,
+    'GUIDED_NOGPS': 20,
+    'SMART_RTL': 21,
+    'FLOWHOLD': 22,
+    'FOLLOW': 23,
+    'ZIGZAG': 24,
+    'SYSTEMID': 25,
+    'AUTOROTATE': 26,
+    'AUTO_RTL': 27,
+    'TURTLE': 28,
+}
+
+
+@dataclass(frozen=True)
+class ArduPilot:
+    """ArduCopter: GUIDED obeys set-points (ArduPilot documentation, Copter commands in GUIDED)."""
+
+    hold_mode: str = 'BRAKE'
+    name: str = 'ardupilot'
+    autopilot: int = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+    streams_before_control: bool = False
+    control_mode: str = 'GUIDED'
+    land_mode: str = 'LAND'
+    level_mode: str = 'GUIDED_NOGPS'
+    estimator_message: int = 193
+    height_message: int = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+    home_is_local: bool = False
+    heartbeat_rate_hz: float = 0.0
+    _names: dict[int, str] = field(
+        default_factory=lambda: {number: name for name, number in ARDUCOPTER_MODES.items()}
+    )
+
+    def mode_name(self, custom_mode: int) -> str:
+        """Return e.g. GUIDED; MODE 99 for one that is not known."""
+        return self._names.get(custom_mode, f'MODE {custom_mode}')
+
+    def mode_command(self, mode: str) -> ModeCommand:
+        """Return (flags, mode number, 0)."""
+        if mode not in ARDUCOPTER_MODES:
+            raise _unknown_mode(mode, list(ARDUCOPTER_MODES))
+        return float(CUSTOM_MODE), float(ARDUCOPTER_MODES[mode]), 0.0
+
+    def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
+        """Return SET_POSITION_TARGET_LOCAL_NED, frame LOCAL_NED, heading held."""
+        return _velocity_message(setpoint, boot_ms, target)
+
+    def landing_target_message(self, site_ned_m: Vector, pose: Pose, stamp_us: int) -> Any:
+        """Return LANDING_TARGET in BODY_FRD, the frame of its precision landing."""
+        body_m = _from_body(site_ned_m, pose)
+        return _landing_target(mavlink.MAV_FRAME_BODY_FRD, body_m, body_m, stamp_us)
+
+
+PX4_MODES: dict[str, tuple[int, int]] = {
+    'MANUAL': (1, 0),
+    'ALTCTL': (2, 0),
+    'POSCTL': (3, 0),
+    'AUTO.READY': (4, 1),
+    'AUTO.TAKEOFF': (4, 2),
+    'AUTO.LOITER': (4, 3),
+    'AUTO.MISSION': (4, 4),
+    'AUTO.RTL': (4, 5),
+    'AUTO.LAND': (4, 6),
+    'ACRO': (5, 0),
+    'OFFBOARD': (6, 0),
+    'STABILIZED': (7, 0),
+}
+"""Main and sub mode: bits 16 to 23 and 24 to 31 of custom_mode (PX4 px4_custom_mode.h)."""
+
+
+@dataclass(frozen=True)
+class Px4:
+    """PX4: OFFBOARD, entered only while set-points flow at 2 Hz or more."""
+
+    name: str = 'px4'
+    autopilot: int = mavlink.MAV_AUTOPILOT_PX4
+    streams_before_control: bool = True
+    control_mode: str = 'OFFBOARD'
+    hold_mode: str = 'AUTO.LOITER'
+    land_mode: str = 'AUTO.LAND'
+    level_mode: str = ''
+    estimator_message: int = 230
+    height_message: int = mavlink.MAVLINK_MSG_ID_ALTITUDE
+    home_is_local: bool = True
+    heartbeat_rate_hz: float = 5.0
+    _names: dict[tuple[int, int], str] = field(
+        default_factory=lambda: {numbers: name for name, numbers in PX4_MODES.items()}
+    )
+
+    def mode_name(self, custom_mode: int) -> str:
+        """Return e.g. OFFBOARD; MODE 4.9 for one that is not known."""
+        main, sub = (custom_mode >> 16) & 0xFF, (custom_mode >> 24) & 0xFF
+        return self._names.get((main, sub), f'MODE {main}.{sub}')
+
+    def mode_command(self, mode: str) -> ModeCommand:
+        """Return (flags, main mode, sub mode)."""
+        if mode not in PX4_MODES:
+            raise _unknown_mode(mode, list(PX4_MODES))
+        main, sub = PX4_MODES[mode]
+        return float(CUSTOM_MODE), float(main), float(sub)
+
+    def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
+        """Return SET_POSITION_TARGET_LOCAL_NED, frame LOCAL_NED, heading held."""
+        return _velocity_message(setpoint, boot_ms, target)
+
+    def landing_target_message(self, site_ned_m: Vector, pose: Pose, stamp_us: int) -> Any:
+        """Return LANDING_TARGET in LOCAL_NED, the only frame that it takes."""
+        body_m = _from_body(site_ned_m, pose)
+        return _landing_target(mavlink.MAV_FRAME_LOCAL_NED, site_ned_m, body_m, stamp_us)
+
+
+DIALECTS = ('auto', 'ardupilot', 'px4')
+NO_MULTICOPTERS = {
+    mavlink.MAV_TYPE_FIXED_WING: 'a fixed-wing aircraft',
+    mavlink.MAV_TYPE_ANTENNA_TRACKER: 'an antenna tracker',
+    mavlink.MAV_TYPE_AIRSHIP: 'an airship',
+    mavlink.MAV_TYPE_GROUND_ROVER: 'a ground vehicle',
+    mavlink.MAV_TYPE_SURFACE_BOAT: 'a boat',
+    mavlink.MAV_TYPE_SUBMARINE: 'a submarine',
+}
+"""MAV_TYPEs that cannot hover; their firmwares also number their modes in another way."""
+VTOL_TYPES = range(19, 26)
+"""MAV_TYPE_VTOL_...; their names differ between versions of pymavlink."""
+
+
+def choose_dialect(
+    wanted: str,
+    autopilot: int,
+    hold_mode: str = 'BRAKE',
+    vehicle_type: int = mavlink.MAV_TYPE_QUADROTOR,
+) -> Dialect:
+    """Return the dialect of the autopilot that was heard.
+
+    Args:
+        wanted: ``auto``, ``ardupilot`` or ``px4``.
+        autopilot: MAV_AUTOPILOT of its HEARTBEAT.
+        hold_mode: ArduPilot's mode for holding position.
+        vehicle_type: MAV_TYPE of its HEARTBEAT.
+
+    Raises:
+        VehicleError: Unknown name, the autopilot heard is another one than was asked for, or its
+            vehicle is no multicopter.
+    """
+    if wanted not in DIALECTS:
+        raise VehicleError(f'dialect {wanted!r}: choose one of {", ".join(DIALECTS)}')
+    kind = NO_MULTICOPTERS.get(vehicle_type, '')
+    if autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA and vehicle_type in VTOL_TYPES:
+        kind = 'a VTOL, which ArduPlane flies'
+    if kind:
+        raise VehicleError(
+            f'the vehicle heard is {kind} (MAV_TYPE {vehicle_type}): connect to a multicopter or '
+            'a helicopter'
+        )
+    known: tuple[Dialect, ...] = (ArduPilot(hold_mode=hold_mode), Px4())
+    for dialect in known:
+        if dialect.autopilot == autopilot:
+            if wanted not in {'auto', dialect.name}:
+                break
+            return dialect
+    raise VehicleError(
+        f'the autopilot heard is of type {autopilot} (MAV_AUTOPILOT) and does not speak '
+        f'{wanted!r}: connect to ArduPilot (3) or PX4 (12), or set dialect to auto'
+    )

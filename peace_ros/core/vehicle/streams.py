@@ -1,0 +1,78 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Asks for the messages that the link needs, and again when they stop; pure."""
+
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from peace_ros.core.vehicle.assembler import Assembler
+from peace_ros.core.vehicle.dialects import Dialect
+from peace_ros.core.vehicle.parameters import VehicleParameters
+
+SILENT_NS = 1_500_000_000
+"""A stream that is silent for so long is asked for again."""
+ASK_AGAIN_NS = 1_000_000_000
+ONCE_AGAIN_NS = 3_000_000_000
+HEALTH_HZ = 1.0
+HEIGHT_HZ = 10.0
+ESTIMATOR_HZ = 4.0
+
+Request = tuple[int, tuple[float, float]]
+"""MAV_CMD and its first two parameters."""
+
+
+class StreamKeeper:
+    """Knows which messages are wanted and when each was last asked for."""
+
+    def __init__(self, parameters: VehicleParameters, dialect: Dialect) -> None:
+        self._rates_hz: dict[int, float] = {
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: parameters.pose_rate_hz,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: parameters.pose_rate_hz,
+            mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: parameters.state_rate_hz,
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: HEALTH_HZ,
+            dialect.estimator_message: ESTIMATOR_HZ,
+            dialect.height_message: HEIGHT_HZ,
+        }
+        if dialect.heartbeat_rate_hz > 0.0:
+            self._rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
+        if parameters.altitude_source == 'rangefinder':
+            self._rates_hz[mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR] = parameters.pose_rate_hz
+        self._wanted_once = [mavlink.MAVLINK_MSG_ID_HOME_POSITION]
+        if not dialect.home_is_local:
+            self._wanted_once.append(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
+        self._asked_ns: dict[int, int] = {}
+        self._reboots = 0
+
+    def due(self, assembler: Assembler, now_ns: int) -> list[Request]:
+        """Return the requests to send now."""
+        if assembler.reboots != self._reboots:
+            self._reboots = assembler.reboots
+            self.forget()
+        requests: list[Request] = []
+        for message_id, rate_hz in self._rates_hz.items():
+            limit_ns = max(SILENT_NS, round(3e9 / rate_hz))
+            silent = now_ns - assembler.arrived_ns.get(message_id, 0) > limit_ns
+            if message_id not in self._asked_ns or silent:
+                request = (
+                    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+                    (float(message_id), 1e6 / rate_hz),
+                )
+                self._ask(requests, message_id, request, ASK_AGAIN_NS, now_ns)
+        for once in self._wanted_once:
+            if once not in assembler.arrived_ns:
+                request = (mavlink.MAV_CMD_REQUEST_MESSAGE, (float(once), 0.0))
+                self._ask(requests, once, request, ONCE_AGAIN_NS, now_ns)
+        return requests
+
+    def forget(self) -> None:
+        """Ask for everything again: the autopilot or the line begins anew."""
+        self._asked_ns.clear()
+
+    def _ask(
+        self, requests: list[Request], key: int, request: Request, again_ns: int, now_ns: int
+    ) -> None:
+        asked_ns = self._asked_ns.get(key)
+        if asked_ns is None or now_ns - asked_ns >= again_ns:
+            self._asked_ns[key] = now_ns
+            requests.append(request)

@@ -1,0 +1,85 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Between bytes and messages: parsing that survives rubbish, packing, signatures."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from peace_ros.core.vehicle.signing import SIGNED, Signer
+
+RADIO_STATUS = 109
+"""Made by the radio in between, which has no key; it tells nothing about the vehicle."""
+CHECKSUM_BYTES = 2
+
+
+class Wire:
+    """One companion's codec.
+
+    Args:
+        system_id: Of this companion.
+        datagrams: Data come as whole datagrams.
+        signer: None: nothing is signed and nothing checked.
+    """
+
+    def __init__(self, system_id: int, signer: Signer | None, *, datagrams: bool) -> None:
+        self._codec = mavlink.MAVLink(None, system_id, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
+        self._signer = signer
+        self._datagrams = datagrams
+        self._lock = threading.Lock()
+        self._stream_parser = _new_parser()
+
+    @property
+    def refused(self) -> int:
+        """Messages that were not signed as they should be."""
+        return 0 if self._signer is None else self._signer.unsigned + self._signer.forged
+
+    def restart(self) -> None:
+        """Forget half a message: the line was opened anew."""
+        self._stream_parser = _new_parser()
+
+    def decode(self, data: bytes) -> list[Any]:
+        """Return the messages that may be believed to be what their signature says."""
+        # Datagrams stand alone: rubbish in one must not swallow the beginning of the next.
+        parser = _new_parser() if self._datagrams else self._stream_parser
+        try:
+            messages = parser.parse_buffer(bytearray(data)) or []
+        except mavlink.MAVError:
+            return []
+        return [m for m in messages if m.get_msgId() >= 0 and self._is_genuine(m)]
+
+    def pack(self, message: Any) -> bytes:
+        """Return the bytes of a message, signed when there is a key."""
+        with self._lock:
+            data = bytes(message.pack(self._codec))
+            self._codec.seq = (self._codec.seq + 1) % 256
+        return data if self._signer is None else self._signer.sign(_declared_signed(data, message))
+
+    def keep(self, now_s: float, *, at_once: bool = False) -> None:
+        """Keep the time stamps of signatures on disk."""
+        if self._signer is not None:
+            self._signer.save(now_s, at_once=at_once)
+
+    def _is_genuine(self, message: Any) -> bool:
+        if self._signer is None or message.get_msgId() == RADIO_STATUS:
+            return True
+        return self._signer.accepts(
+            bytes(message.get_msgbuf()), message.get_srcSystem(), message.get_srcComponent()
+        )
+
+
+def _declared_signed(data: bytes, message: Any) -> bytes:
+    """Set the flag that a signature follows, and the checksum that belongs to it."""
+    body = bytearray(data[:-CHECKSUM_BYTES])
+    body[2] |= SIGNED
+    checksum = mavlink.x25crc(bytes(body[1:]) + bytes([message.crc_extra]))
+    return bytes(body) + int(checksum.crc).to_bytes(CHECKSUM_BYTES, 'little')
+
+
+def _new_parser() -> Any:
+    parser = mavlink.MAVLink(None)
+    parser.robust_parsing = True
+    return parser

@@ -1,0 +1,145 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Measurements -> the figures of ``--json`` and a Markdown table."""
+
+from __future__ import annotations
+
+import os
+import platform
+from typing import TYPE_CHECKING, Any
+
+import onnxruntime as ort
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from peace_ros.lab.benchmark.measure import Measured
+
+Figures = dict[str, Any]
+
+
+def clipseg_figures(
+    ours: Measured,
+    memory: Measured | None,
+    reference: Measured | None,
+    blabberseg: Measured | None,
+) -> Figures:
+    """Return the ``clipseg`` object; figures whose measurement was not asked for are None."""
+    frame = ours.stages_ms['frame']
+    extra = ours.extra
+
+    def ratio(other: Measured | None) -> float | None:
+        return None if other is None else other.stages_ms['frame'].p50 / frame.p50
+
+    def busy_ratio(other: Measured | None) -> float | None:
+        return None if other is None else other.processor_ms / ours.processor_ms
+
+    return {
+        'frame_ms_p50': frame.p50,
+        'frame_ms_p95': frame.p95,
+        'speedup_vs_reference': ratio(reference),
+        'speedup_vs_blabberseg': ratio(blabberseg),
+        'cost_39_over_13_terms': extra['cost_39_over_13_terms'],
+        'cost_per_further_term': extra['cost_per_term'],
+        'dynamic_prompt_share': extra['dynamic_prompt_share'],
+        'peak_rss_mb': (memory or ours).peak_rss_mb,
+        'peak_rss_mb_of_all': ours.peak_rss_mb,
+        'calls_per_frame': extra['steady_calls'],
+        'calls_per_frame_with_dynamic_prompts': extra['calls_per_frame'],
+        'processor_ms_p50': ours.processor_ms,
+        'processor_time_vs_reference': busy_ratio(reference),
+        'processor_time_vs_blabberseg': busy_ratio(blabberseg),
+        'frames_per_s': 1e3 / frame.mean,
+        'ranking_ms': extra['ranking_ms'],
+        'prompts': extra['prompts'],
+        'ways': [
+            each.as_json() for each in (ours, memory, reference, blabberseg) if each is not None
+        ],
+    }
+
+
+NO_BLABBERSEG = 'BlabberSeg is a scheme for CLIPSeg; there is none of FastSAM to compare with'
+
+
+def fastsam_figures(
+    ours: Measured, reference: Measured | None, images_only: Measured | None
+) -> Figures:
+    """Return the ``fastsam`` object; figures whose measurement was not asked for are None.
+
+    Args:
+        ours: segments scored in one batch.
+        reference: one CLIP call per segment, with the texts in each.
+        images_only: the same without the texts.
+    """
+    frame = ours.stages_ms['frame']
+
+    def ratio(other: Measured | None) -> float | None:
+        return None if other is None else other.stages_ms['frame'].p50 / frame.p50
+
+    return {
+        'frame_ms_p50': frame.p50,
+        'frame_ms_p95': frame.p95,
+        'speedup_vs_reference': ratio(reference),
+        'speedup_vs_reference_without_texts': ratio(images_only),
+        'processor_time_vs_reference': (
+            None if reference is None else reference.processor_ms / ours.processor_ms
+        ),
+        'speedup_vs_blabberseg': None,
+        'speedup_vs_blabberseg_reason': NO_BLABBERSEG,
+        'cost_39_over_13_terms': ours.extra['cost_39_over_13_terms'],
+        'dynamic_prompt_share': ours.extra['dynamic_prompt_share'],
+        'peak_rss_mb': ours.peak_rss_mb,
+        'calls_per_frame': ours.extra['steady_calls'],
+        'segments_per_frame': ours.extra['segments_per_frame'],
+        'processor_ms_p50': ours.processor_ms,
+        'frames_per_s': 1e3 / frame.mean,
+        'ways': [each.as_json() for each in (ours, reference, images_only) if each is not None],
+    }
+
+
+def markdown(ways: Sequence[Measured], figures: Figures, conditions: str) -> str:
+    """Return the table that is printed and saved."""
+    lines = [
+        f'# peace benchmark\n\n{conditions}\n',
+        '| way | networks | stage | p50 ms | p95 ms | p99 ms | frames/s |',
+        '|---|---|---|---:|---:|---:|---:|',
+    ]
+    for way in ways:
+        for stage, spread in way.stages_ms.items():
+            rate = f'{1e3 / spread.mean:.2f}' if stage == 'frame' else ''
+            lines.append(
+                f'| {way.name} | {way.conditions} | {stage} | {spread.p50:.1f} | '
+                f'{spread.p95:.1f} | {spread.p99:.1f} | {rate} |'
+            )
+    lines += ['', '| figure | value |', '|---|---|']
+    for name, value in figures.items():
+        if name != 'ways':
+            lines.append(f'| {name} | {_text(value)} |')
+    return '\n'.join(lines) + '\n'
+
+
+def describe_machine(threads: int, terms: int) -> str:
+    """Return the conditions of a measurement in a sentence."""
+    load = os.getloadavg()[0]
+    return (
+        f'{_processor()}, {os.cpu_count()} cores, {threads} threads; ONNX Runtime '
+        f'{ort.__version__}, Python {platform.python_version()}; {terms} terms; load average '
+        f'{load:.1f} at the start.'
+    )
+
+
+def _processor() -> str:
+    try:
+        with open('/proc/cpuinfo', encoding='utf-8') as file:  # noqa: PTH123 - not a real file
+            names = [line.split(':', 1)[1].strip() for line in file if 'model name' in line]
+    except OSError:
+        names = []
+    return names[0] if names else platform.machine()
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return 'not measured'
+    if isinstance(value, dict):
+        return ', '.join(f'{name} {_text(each)}' for name, each in value.items())
+    return f'{value:.3g}' if isinstance(value, float) else str(value)

@@ -1,0 +1,155 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Histograms -> rates. Every function takes [..., LABELS, BINS] and keeps the leading axes.
+
+A rate of nothing (no pixel of that kind) is NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from peace_ros.core.domain import SAFE_LABELS, Label
+from peace_ros.lab.evaluation.segmentation.histograms import BINS, middles
+
+Array = NDArray[np.float64]
+
+SAFE = tuple(sorted(int(label) for label in SAFE_LABELS))
+UNSAFE = tuple(
+    int(label) for label in Label if label != Label.UNLABELED and label not in SAFE_LABELS
+)
+HAZARDS: Mapping[str, Label] = MappingProxyType(
+    {
+        'person': Label.PERSON,
+        'vehicle': Label.VEHICLE,
+        'water': Label.WATER,
+        'building': Label.BUILDING,
+        'road': Label.PAVED,
+        'tree': Label.TREE,
+        'obstacle': Label.OBSTACLE,
+    }
+)
+CALIBRATION_BINS = 10
+
+
+def ratio(part: Array, whole: Array) -> Array:
+    """Return part / whole, NaN where whole is 0."""
+    part, whole = np.broadcast_arrays(np.asarray(part, float), np.asarray(whole, float))
+    out = np.full(part.shape, np.nan)
+    np.divide(part, whole, out=out, where=whole > 0)
+    return out
+
+
+class Areas:
+    """Labelled ground by what it is and what it is called, in pixels, at one or all thresholds.
+
+    Each field has the leading axes of the histograms, and a last axis of BINS when no threshold
+    is given: entry k is for calling safe what lies in bin k and above.
+    """
+
+    def __init__(self, counts: NDArray[np.generic], threshold_bin: int | None) -> None:
+        wide = np.asarray(counts, np.float64)
+        safe, unsafe = wide[..., SAFE, :].sum(-2), wide[..., UNSAFE, :].sum(-2)
+        self.safe_called, self.safe_missed = _split(safe, threshold_bin)
+        self.unsafe_called, self.unsafe_kept = _split(unsafe, threshold_bin)
+
+    @property
+    def iou_safe(self) -> Array:
+        """Intersection over union of safe ground."""
+        return ratio(self.safe_called, self.safe_called + self.safe_missed + self.unsafe_called)
+
+    @property
+    def iou_unsafe(self) -> Array:
+        """Intersection over union of unsafe ground."""
+        return ratio(self.unsafe_kept, self.unsafe_kept + self.unsafe_called + self.safe_missed)
+
+    @property
+    def miou(self) -> Array:
+        """Mean of both."""
+        return (self.iou_safe + self.iou_unsafe) / 2.0
+
+    @property
+    def false_safe(self) -> Array:
+        """Share of the ground called safe that is unsafe."""
+        return ratio(self.unsafe_called, self.unsafe_called + self.safe_called)
+
+    @property
+    def recall(self) -> Array:
+        """Share of safe ground that is called safe."""
+        return ratio(self.safe_called, self.safe_called + self.safe_missed)
+
+    @property
+    def called_safe(self) -> Array:
+        """Share of all labelled ground that is called safe."""
+        called = self.safe_called + self.unsafe_called
+        return ratio(called, called + self.safe_missed + self.unsafe_kept)
+
+    @property
+    def unsafe_called_safe(self) -> Array:
+        """Share of unsafe ground that is called safe."""
+        return ratio(self.unsafe_called, self.unsafe_called + self.unsafe_kept)
+
+    @property
+    def baseline_miou(self) -> Array:
+        """Mean IoU of an answer that calls everything unsafe."""
+        safe, unsafe = self.safe_called + self.safe_missed, self.unsafe_called + self.unsafe_kept
+        return np.where(safe > 0, ratio(unsafe, safe + unsafe) / 2.0, np.nan)
+
+
+def _split(counts: Array, threshold_bin: int | None) -> tuple[Array, Array]:
+    called = np.cumsum(counts[..., ::-1], axis=-1)[..., ::-1]
+    missed = called[..., :1] - called
+    if threshold_bin is None:
+        return called, missed
+    return called[..., threshold_bin], missed[..., threshold_bin]
+
+
+def share_called_safe(counts: NDArray[np.generic], label: Label, threshold_bin: int) -> Array:
+    """Return the share of a label's pixels that is called safe."""
+    of_label = np.asarray(counts, np.float64)[..., int(label), :]
+    return ratio(of_label[..., threshold_bin:].sum(-1), of_label.sum(-1))
+
+
+def _calibration_groups() -> NDArray[np.intp]:
+    return np.minimum((middles() * CALIBRATION_BINS).astype(np.intp), CALIBRATION_BINS - 1)
+
+
+def reliability(counts: NDArray[np.generic]) -> tuple[Array, Array, Array]:
+    """Return mean score, share of safe ground and pixels, each [..., CALIBRATION_BINS]."""
+    wide = np.asarray(counts, np.float64)
+    safe = wide[..., SAFE, :].sum(-2)
+    every = safe + wide[..., UNSAFE, :].sum(-2)
+    member = np.zeros((BINS, CALIBRATION_BINS))
+    member[np.arange(BINS), _calibration_groups()] = 1.0
+    pixels = every @ member
+    return ratio((every * middles()) @ member, pixels), ratio(safe @ member, pixels), pixels
+
+
+def calibration_error(counts: NDArray[np.generic]) -> Array:
+    """Return the expected calibration error (Naeini et al. 2015) over CALIBRATION_BINS bins."""
+    scores, shares, pixels = reliability(counts)
+    gaps = np.where(pixels > 0, np.abs(np.nan_to_num(scores) - np.nan_to_num(shares)), 0.0)
+    return ratio((gaps * pixels).sum(-1), pixels.sum(-1))
+
+
+def average_precision(counts: NDArray[np.generic]) -> Array:
+    """Return the area under precision over recall of safe ground, by steps."""
+    areas = Areas(counts, None)
+    # From strict to lenient, so that recall grows.
+    recall = np.nan_to_num(areas.recall)[..., ::-1]
+    precision = np.nan_to_num(1.0 - areas.false_safe, nan=1.0)[..., ::-1]
+    steps = np.diff(recall, axis=-1, prepend=0.0)
+    some = areas.safe_called[..., 0] + areas.safe_missed[..., 0] > 0
+    return np.where(some, (steps * precision).sum(-1), np.nan)
+
+
+def term_iou(counts: NDArray[np.generic]) -> Array:
+    """Return the IoU of a term at each threshold, [..., BINS], from [..., 2, BINS]."""
+    wide = np.asarray(counts, np.float64)
+    called, missed = _split(wide[..., 1, :], None)
+    wrong, _ = _split(wide[..., 0, :], None)
+    return ratio(called, called + missed + wrong)

@@ -1,0 +1,322 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Landings in wind with gusts: how far beside the site, how low, and whether it swings.
+
+``python -m peace_ros.lab.evaluation.wind --seeds 12`` flies the landing core against the physics
+and the GUIDED mode of the simulated autopilot, in simulated time: wind leans the vehicle and its
+camera, gusts push it. Poses are late by what a line takes, heatmaps by what a network takes; the
+heatmaps are those of a modest model (smooth errors) over one safe island.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from math import cos, hypot, inf, pi, sin
+from pathlib import Path
+from time import monotonic
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from peace_ros.core.domain import Camera, Heatmap, Pose, Setpoint, Site, Telemetry, VehicleError
+from peace_ros.core.domain.geometry import ground_to_image
+from peace_ros.core.landing import Decision, LandingCore, LandingParameters, State
+from peace_ros.core.mapping import MapParameters
+from peace_ros.simulation.autopilot.flight import Flight
+from peace_ros.simulation.autopilot.guided import PositionTarget
+from peace_ros.simulation.autopilot.modes import Mode
+from peace_ros.simulation.autopilot.physics import Physics
+
+ERROR_LIMIT_M = 1.5
+OVERSHOOT_LIMIT_M = 1.0
+SWING_LIMIT_M = 1.0
+"""Way to and fro of a vehicle that circles its site instead of coming to rest over it."""
+START_M = 60.0
+ISLAND_M = 12.0
+"""Radius of the safe ground."""
+_TICK_S = 0.01
+_POSE_S = 0.03
+_STEP_S = 0.05
+_LINE_DELAY_S = 0.04
+_LATENCY_S = 0.3
+_LIMIT_S = 150.0
+_AFTER_S = 10.0
+"""Watched after the hand-over: gusts go on pushing."""
+_LAST_S = 10.0
+"""Of the descent, in which it has to be at rest over the site."""
+_BOOT_S = 60.0
+_VELOCITY_AND_RATE = 0x5C7
+_LOCAL_NED = 1
+_PIXELS = 96
+_CELL_M = 0.5
+_HALF_M = 100.0
+_SAFE, _UNSAFE = 0.9, 0.1
+_NOISE, _NOISE_PX = 0.15, 5.0
+"""Standard deviation and width of the errors of the heatmaps."""
+
+
+@dataclass(frozen=True)
+class Landed:
+    """One flight."""
+
+    seed: int
+    handed_over: bool
+    seconds: float
+    error_m: float
+    """True distance to the middle of the site at the hand-over."""
+    worst_after_m: float
+    """True distance to the same place, the largest of the seconds after it."""
+    lowest_m: float
+    """True altitude, until those seconds are over."""
+    swing_m: float
+    """To and fro over the ground, the larger of both axes, in the last seconds of the descent."""
+    attempts: int
+
+    @property
+    def is_good(self) -> bool:
+        """Whether it kept the limits."""
+        floor_m = LandingParameters().handover_altitude_m
+        return (
+            self.handed_over
+            and self.error_m <= ERROR_LIMIT_M
+            and self.lowest_m >= floor_m - OVERSHOOT_LIMIT_M
+            and self.swing_m <= SWING_LIMIT_M
+        )
+
+
+class WindFlight:
+    """One vehicle with its landing, in simulated time.
+
+    Args:
+        wind_m_s: Mean speed of the wind; its direction comes from the seed.
+        gust_m_s: Standard deviation of the gusts.
+        seed: Of gusts, direction, place of the island and errors of the heatmaps.
+        heatmap_hz: Heatmaps per second.
+    """
+
+    def __init__(
+        self, wind_m_s: float, gust_m_s: float, seed: int, heatmap_hz: float = 5.0
+    ) -> None:
+        self._random = np.random.default_rng(seed)
+        self._seed, self._heatmap_s = seed, 1.0 / heatmap_hz
+        way = float(self._random.uniform(0.0, 2.0 * pi))
+        wind = (wind_m_s * cos(way), wind_m_s * sin(way))
+        self._flight = _flying(Physics(wind_to_m_s=wind, gust_m_s=gust_m_s, seed=seed))
+        self._ground = self._painted()
+        self._camera = Camera.from_degrees(_PIXELS, _PIXELS, 73)
+        self._core = LandingCore(LandingParameters(), self._camera, MapParameters(map_size_m=160.0))
+        self._core.engage()
+        self._poses: deque[tuple[float, Pose, tuple[float, float, float]]] = deque()
+        self._heatmaps: deque[tuple[float, Heatmap]] = deque()
+        self._telemetry = Telemetry(received_ns=0)
+        self._told_s = self._now_s
+        self._due_s = dict.fromkeys(('pose', 'heatmap', 'step'), self._now_s)
+        self._lowest_m = START_M
+        self.track: list[tuple[float, float, float, Decision]] = []
+        """Time, true north and east, and the decision of each step."""
+
+    @property
+    def _now_s(self) -> float:
+        return self._flight.time_s
+
+    def run(self) -> Landed:
+        """Fly until the landing is over, and a little longer."""
+        begin_s = over_s = self._now_s
+        outcome = None
+        while outcome is None and self._now_s < begin_s + _LIMIT_S:
+            self._tick()
+            outcome = self.track[-1][3].outcome if self.track else None
+        over_s, at = self._now_s, len(self.track) - 1
+        site = self.track[at][3].site
+        while self._now_s < over_s + _AFTER_S:
+            self._tick()
+        return Landed(
+            seed=self._seed,
+            handed_over=outcome == 'handover',
+            seconds=round(over_s - begin_s, 1),
+            error_m=round(self._error_m(at, site), 3),
+            worst_after_m=round(max(self._error_m(n, site) for n in range(at, len(self.track))), 3),
+            lowest_m=round(self._lowest_m, 3),
+            swing_m=round(self._swing_m(over_s), 3),
+            attempts=self.track[-1][3].attempts,
+        )
+
+    def _tick(self) -> None:
+        if self._is_due('pose', _POSE_S):
+            self._report()
+        if self._is_due('heatmap', self._heatmap_s):
+            self._look()
+        self._receive()
+        if self._is_due('step', _STEP_S):
+            self._decide()
+        self._flight.step(_TICK_S)
+        self._lowest_m = min(self._lowest_m, -self._flight.physics.down_m)
+
+    def _is_due(self, name: str, period_s: float) -> bool:
+        if self._now_s + 1e-9 < self._due_s[name]:
+            return False
+        self._due_s[name] += period_s
+        return True
+
+    def _pose(self) -> Pose:
+        north, east, down = self._flight.position_m
+        q = self._flight.physics.quaternion_ned_frd
+        return Pose(round(self._now_s * 1e9), north, east, down, q, -down)
+
+    def _report(self) -> None:
+        velocity = self._flight.physics.velocity_ned_m_s
+        self._poses.append((self._now_s + _LINE_DELAY_S, self._pose(), velocity))
+
+    def _look(self) -> None:
+        pose = self._pose()
+        matrix = ground_to_image(self._camera, pose) @ np.array(
+            [[0.0, _CELL_M, -_HALF_M], [_CELL_M, 0.0, -_HALF_M], [0.0, 0.0, 1.0]]
+        )
+        size = (_PIXELS, _PIXELS)
+        true = cv2.warpPerspective(self._ground, matrix, size, borderValue=_UNSAFE)
+        noise = cv2.GaussianBlur(self._random.standard_normal(size), (0, 0), _NOISE_PX)
+        safety = np.clip(true + _NOISE * noise / noise.std(), 0.0, 1.0).astype(np.float32)
+        self._heatmaps.append((self._now_s + _LATENCY_S, Heatmap(safety, pose.stamp_ns)))
+
+    def _receive(self) -> None:
+        while self._poses and self._poses[0][0] <= self._now_s:
+            _, pose, velocity = self._poses.popleft()
+            self._core.add_pose(pose)
+            self._told_s = self._now_s
+            self._telemetry = Telemetry(
+                1, pose, *velocity, armed=True, in_control=True, mode='GUIDED', landed=False
+            )
+        while self._heatmaps and self._heatmaps[0][0] <= self._now_s:
+            self._core.add_heatmap(self._heatmaps.popleft()[1])
+
+    def _decide(self) -> None:
+        age_s = self._now_s - self._told_s
+        decision = self._core.step(round(self._now_s * 1e9), self._telemetry, age_s)
+        physics = self._flight.physics
+        self.track.append((self._now_s, physics.north_m, physics.east_m, decision))
+        self._flight.take_velocity(_target(decision.setpoint))
+
+    def _error_m(self, index: int, site: Site | None) -> float:
+        _, north, east, _ = self.track[index]
+        return inf if site is None else hypot(site.north_m - north, site.east_m - east)
+
+    def _swing_m(self, over_s: float) -> float:
+        places = [
+            (north, east)
+            for at_s, north, east, decision in self.track
+            if over_s - _LAST_S <= at_s <= over_s and decision.state is State.LANDING
+        ]
+        return to_and_fro_m(np.array(places).reshape(-1, 2))
+
+    def _painted(self) -> NDArray[np.float32]:
+        """Return the ground: rows to the north, columns to the east."""
+        cells = round(2.0 * _HALF_M / _CELL_M)
+        ground = np.full((cells, cells), _UNSAFE, np.float32)
+        north, east = self._random.uniform(-15.0, 15.0, size=2)
+        centre = (round((east + _HALF_M) / _CELL_M), round((north + _HALF_M) / _CELL_M))
+        cv2.circle(ground, centre, round(ISLAND_M / _CELL_M), _SAFE, -1)
+        return ground
+
+
+def to_and_fro_m(places_m: NDArray[np.float64]) -> float:
+    """Return how far a way over the ground (N, 2) goes and comes back, the larger of both axes.
+
+    A way in one direction counts nothing, however long: the site moves a little as the map grows.
+    """
+    if len(places_m) == 0:
+        return 0.0
+    rise = (places_m - np.minimum.accumulate(places_m)).max(axis=0)
+    fall = (np.maximum.accumulate(places_m) - places_m).max(axis=0)
+    return float(np.minimum(rise, fall).max())
+
+
+def _flying(physics: Physics) -> Flight:
+    """Return an autopilot that has hovered in this wind for a while, in GUIDED.
+
+    Raises:
+        VehicleError: it does not come into the air.
+    """
+    flight = Flight(physics)
+    while not flight.has_position:
+        flight.step(_TICK_S)
+    flight.set_mode(Mode.GUIDED)
+    flight.arm(force=True)
+    flight.take_off(5.0)
+    until_s = flight.time_s + _BOOT_S
+    while flight.landed_state.name != 'IN_AIR':
+        if flight.time_s > until_s:
+            raise VehicleError(f'the simulated vehicle did not take off within {_BOOT_S:g} s')
+        flight.step(_TICK_S)
+    physics.north_m = physics.east_m = 0.0
+    physics.down_m = -START_M
+    for mode in (Mode.BRAKE, Mode.GUIDED):
+        flight.set_mode(mode)
+        for _ in range(round(3.0 / _TICK_S)):
+            flight.step(_TICK_S)
+    return flight
+
+
+def _target(setpoint: Setpoint) -> PositionTarget:
+    velocity = (setpoint.v_north_m_s, setpoint.v_east_m_s, setpoint.v_down_m_s)
+    return PositionTarget(_LOCAL_NED, _VELOCITY_AND_RATE, velocity)
+
+
+def fly(
+    seeds: int, wind_m_s: float, gust_m_s: float, heatmap_hz: float = 5.0, *, tell: bool = False
+) -> list[Landed]:
+    """Fly with each seed from 1 on."""
+    flown: list[Landed] = []
+    begun_s = monotonic()
+    for seed in range(1, seeds + 1):
+        flown.append(WindFlight(wind_m_s, gust_m_s, seed, heatmap_hz).run())
+        if tell:
+            sys.stderr.write(f'\r{seed} of {seeds} flights, {monotonic() - begun_s:.0f} s')
+            sys.stderr.flush()
+    if tell:
+        sys.stderr.write('\n')
+    return flown
+
+
+def _line(each: Landed) -> str:
+    return (
+        f'{each.seed:4d}  {each.seconds:6.1f}  {each.error_m:7.2f}  {each.worst_after_m:7.2f}  '
+        f'{each.lowest_m:8.2f}  {each.swing_m:7.2f}{"" if each.is_good else "  FAILED"}'
+    )
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Fly from the command line; 1 when a flight did not keep the limits."""
+    parser = argparse.ArgumentParser(
+        prog='python -m peace_ros.lab.evaluation.wind', description=(__doc__ or '').splitlines()[0]
+    )
+    parser.add_argument('--seeds', type=int, default=12)
+    parser.add_argument('--wind', type=float, default=5.0, help='mean speed, m/s')
+    parser.add_argument('--gust', type=float, default=1.5, help='standard deviation, m/s')
+    parser.add_argument('--heatmaps', type=float, default=5.0, help='per second')
+    parser.add_argument('--json', type=Path, help='write the flights to this file')
+    given = parser.parse_args(args)
+    flown = fly(given.seeds, given.wind, given.gust, given.heatmaps, tell=True)
+    if given.json is not None:
+        given.json.write_text(json.dumps([asdict(each) for each in flown], indent=2) + '\n')
+    good = sum(each.is_good for each in flown)
+    air = f'wind {given.wind:g} m/s, gusts {given.gust:g} m/s'
+    limits = (
+        f'error {ERROR_LIMIT_M:g} m, overshoot {OVERSHOOT_LIMIT_M:g} m, swing {SWING_LIMIT_M:g} m'
+    )
+    lines = [
+        'seed  time s  error m  after m  lowest m  swing m',
+        *(_line(each) for each in flown),
+        f'{air}: {good} of {len(flown)} within {limits}',
+    ]
+    sys.stdout.write('\n'.join(lines) + '\n')
+    return 0 if good == len(flown) else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,121 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Towers -> ONNX files that honour the contract, in fp32."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor, nn
+
+from peace_ros.core.inference.contract import (
+    ATTENTION_MASK,
+    IMAGE_EMBEDDING,
+    INPUT_IDS,
+    IS_POSITIVE,
+    NEGATIVE,
+    PIXEL_VALUES,
+    POSITIVE,
+    SOFTMAX_POSITIVE,
+    TERM_LOGITS,
+    TEXT_EMBEDDING,
+)
+from peace_ros.lab.export.decoder import ClipSegDecoderGraph
+from peace_ros.lab.export.towers import ClipImageTower, ClipSegImageTower, TextTower
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    Prepare = Callable[[str, nn.Module], nn.Module]
+
+OPSET = 17
+"""The first with LayerNormalization, which keeps fp16 from collapsing."""
+
+_BATCH_AND_LENGTH = {0: 'B', 1: 'L'}
+_PER_TERM = {0: 'T'}
+
+
+def as_it_is(role: str, tower: nn.Module) -> nn.Module:  # noqa: ARG001 - a Prepare
+    """Write a tower without change."""
+    return tower
+
+
+def write_clip_graphs(
+    reference: Any, folder: Path, *, side_px: int, end_of_text: int, prepare: Prepare = as_it_is
+) -> None:
+    """Write image_encoder.onnx and text_encoder.onnx of a CLIP model.
+
+    ``prepare`` takes a role and its tower and returns the tower to write instead.
+    """
+    _write(
+        prepare('image_encoder', ClipImageTower(reference, side_px)),
+        (torch.zeros(1, 3, side_px, side_px),),
+        folder / 'image_encoder.onnx',
+        (PIXEL_VALUES,),
+        (IMAGE_EMBEDDING,),
+    )
+    _write_text(TextTower(reference, end_of_text), folder)
+
+
+def write_clipseg_graphs(
+    reference: Any, folder: Path, *, side_px: int, end_of_text: int, prepare: Prepare = as_it_is
+) -> None:
+    """Write image_encoder.onnx, text_encoder.onnx and decoder.onnx of a CLIPSeg model.
+
+    ``prepare`` as above; the image encoder comes first.
+    """
+    tower = ClipSegImageTower(reference, side_px)
+    names = tuple(f'layer_{layer}' for layer in tower.trunk.read_after)
+    pixels = torch.zeros(1, 3, side_px, side_px)
+    encoder = prepare('image_encoder', tower)
+    _write(encoder, (pixels,), folder / 'image_encoder.onnx', (PIXEL_VALUES,), names)
+    _write_text(TextTower(reference.clip, end_of_text), folder)
+    with torch.no_grad():
+        features = tower(pixels)
+    width = int(reference.config.projection_dim)
+    _write(
+        prepare('decoder', ClipSegDecoderGraph(reference, tower.rows)),
+        (*features, torch.zeros(3, width), torch.tensor([1.0, 1.0, 0.0])),
+        folder / 'decoder.onnx',
+        (*names, TEXT_EMBEDDING, IS_POSITIVE),
+        (POSITIVE, NEGATIVE, SOFTMAX_POSITIVE, TERM_LOGITS),
+        {TEXT_EMBEDDING: _PER_TERM, IS_POSITIVE: _PER_TERM, TERM_LOGITS: _PER_TERM},
+    )
+
+
+def _write_text(tower: TextTower, folder: Path) -> None:
+    ids = torch.full((2, 5), tower.end_of_text)
+    _write(
+        tower,
+        (ids, torch.ones_like(ids)),
+        folder / 'text_encoder.onnx',
+        (INPUT_IDS, ATTENTION_MASK),
+        (TEXT_EMBEDDING,),
+        {INPUT_IDS: _BATCH_AND_LENGTH, ATTENTION_MASK: _BATCH_AND_LENGTH, TEXT_EMBEDDING: {0: 'B'}},
+    )
+
+
+def _write(
+    module: nn.Module,
+    inputs: tuple[Tensor, ...],
+    path: Path,
+    input_names: Sequence[str],
+    output_names: Sequence[str],
+    dynamic_axes: Mapping[str, Mapping[int, str]] | None = None,
+) -> None:
+    with torch.no_grad(), warnings.catch_warnings():
+        # The newer exporter of torch needs one more package and names the axes its own way.
+        warnings.simplefilter('ignore')
+        torch.onnx.export(
+            module.eval(),
+            inputs,
+            str(path),
+            dynamo=False,
+            opset_version=OPSET,
+            input_names=list(input_names),
+            output_names=list(output_names),
+            dynamic_axes=dict(dynamic_axes or {}),
+        )

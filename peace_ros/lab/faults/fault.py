@@ -1,0 +1,139 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A fault as data: what is done when, and what has to happen within which time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import TYPE_CHECKING, Protocol
+
+from peace_ros.core.domain import ConfigurationError
+from peace_ros.core.landing import State
+
+if TYPE_CHECKING:
+    from peace_ros.lab.faults.bench import FlightBench
+
+GOING = (
+    State.SEARCHING.value,
+    State.AIMING.value,
+    State.LANDING.value,
+    State.HANDOVER.value,
+)
+"""States of a landing that is not disturbed."""
+LOOKING_AGAIN = (
+    State.WAITING.value,
+    State.CLIMBING.value,
+    State.RESTARTING.value,
+    State.SEARCHING.value,
+)
+"""States of a landing that has lost its site."""
+LEAD_BELOW_M = 45.0
+UNDER_WAY = (State.AIMING.value, State.LANDING.value, State.HANDOVER.value)
+ABSENT = ''
+"""In place of a state: the landing node says nothing."""
+
+
+class Injection(Protocol):
+    """Something that goes wrong; unknown to the companion."""
+
+    def begin(self, bench: FlightBench, /) -> None:
+        """Let it go wrong."""
+        ...
+
+    def end(self, bench: FlightBench, /) -> None:
+        """Mend it."""
+        ...
+
+
+@dataclass(frozen=True)
+class Moment:
+    """When a fault is injected."""
+
+    state: str = State.LANDING.value
+    below_m: float = inf
+    """True altitude, at which or below which."""
+
+    def __str__(self) -> str:
+        if self.below_m == inf:
+            return f'in {self.state}'
+        return f'in {self.state} below {self.below_m:g} m'
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What has to happen; each limit counts from the injection unless it says otherwise."""
+
+    reaches: tuple[str, ...] = ()
+    """One of these states is reached; empty asks for none."""
+    within_s: float = 0.0
+    allowed: tuple[str, ...] = ()
+    """No other state occurs while the fault lasts; empty allows all."""
+    still_within_s: float | None = None
+    """From then on, while the fault lasts, the vehicle truly does not descend."""
+    silent_within_s: float | None = None
+    """From then on no set-point is on the wire, also after the fault."""
+    zero_within_s: float | None = None
+    """From then on every set-point on the wire is zero while the fault lasts."""
+    recovers: tuple[str, ...] = ()
+    """One of these states is reached after the fault; empty asks for none."""
+    recovers_within_s: float = 0.0
+    """Counted from the end of the fault."""
+    stays: str = ''
+    """After the fault nothing but this state is seen until the end."""
+    ends_processes: tuple[str, ...] = ()
+    """Processes that end by themselves because of the fault, with a sentence in their log."""
+    refuses: bool = False
+    """The engagement is refused with a sentence."""
+    over_person_s: float | None = None
+    """The vehicle descends within its safety radius of a person for no longer than this."""
+    flies: bool = True
+    """The vehicle is held in the air; False where the autopilot itself lets go."""
+
+    def __post_init__(self) -> None:
+        known = {state.value for state in State} | {ABSENT}
+        for name in (*self.reaches, *self.allowed, *self.recovers, self.stays):
+            if name not in known:
+                raise ConfigurationError(f'state {name!r} of a fault: choose one of {known}')
+        if bool(self.reaches) != (self.within_s > 0.0):
+            raise ConfigurationError(f'{self.reaches} within {self.within_s} s: give both or none')
+
+
+@dataclass(frozen=True)
+class FlightSetting:
+    """The flight that a fault is put into; faults of one setting share their processes."""
+
+    world: str = 'meadow'
+    """``meadow``: open ground below the start; ``crowded``: the same, every part of it occupied;
+    ``roofs``: the start lies over buildings, with open ground in sight."""
+    prompts: bool = False
+    """With the prompt generator; otherwise the prompt is static."""
+    sim_time: bool = False
+    """All nodes take their time from ``/clock``."""
+    signed: bool = False
+    """Companion and autopilot share a key of MAVLink 2 signing."""
+    at_origin: bool = False
+    """The flight begins at the origin of the local frame, where a mirrored position is the same."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One row of the matrix."""
+
+    name: str
+    group: str
+    title: str
+    """What goes wrong, in words."""
+    injection: Injection
+    expected: Expected
+    behaviour: str
+    """What the landing does about it: one sentence for the documentation."""
+    at: Moment = Moment(below_m=45.0)
+    lasts_s: float = 5.0
+    """The fault ends after this; and earlier when ``until_reached`` and the state is there."""
+    until_reached: bool = False
+    lead: Injection | None = None
+    """Brings a landing below 45 m to the state of the moment; it is mended with the fault."""
+    setting: FlightSetting = FlightSetting()
+    note: str = ''
+    """What the test of this fault does not show."""

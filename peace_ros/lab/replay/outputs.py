@@ -1,0 +1,112 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a replay writes: a bag of the same topics as in flight, a contact sheet, a video."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from peace_ros.core.landing.pairs import decision_pairs
+from peace_ros.core.prompting.pairs import prompt_pairs
+from peace_ros.core.segmentation import draw_overlay
+from peace_ros.recording import BagWriter, VideoWriter, canvas, save_picture
+from peace_ros.recording.contact_sheet import Cell, draw_contact_sheet
+from peace_ros.recording.messages import diagnostic_array, jpeg_image, mono8_image
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from numpy.typing import NDArray
+    from typing_extensions import Self
+
+    from peace_ros.lab.replay.line import ReplayedFrame, Step
+
+_CELLS = 20
+_OK, _WARN = 0, 1
+_QUIET_STATES = frozenset({'HOLD', 'ABORTED'})
+
+
+class ReplayOutputs:
+    """The files of a replay; a bag and a video appear under their names only when whole."""
+
+    def __init__(self, folder: Path, frames: int, video_hz: float | None, title: str) -> None:
+        """Prepare the files.
+
+        Args:
+            folder: exists already.
+            frames: about how many frames will come, to spread the contact sheet over them.
+            video_hz: frame rate of the overlay video; None writes none.
+            title: of the contact sheet.
+
+        """
+        self._folder = folder
+        self._every = max(1, frames // _CELLS)
+        self._title = title
+        self._files = ExitStack()
+        self._bag = BagWriter(folder / 'replay.mcap')
+        self._video = VideoWriter(folder / 'overlays.mp4', video_hz) if video_hz else None
+        self._cells: list[Cell] = []
+        self._looks = 0
+        self._caption = ''
+
+    def __enter__(self) -> Self:
+        """Create the files."""
+        self._files.enter_context(self._bag)
+        if self._video is not None:
+            self._files.enter_context(self._video)
+        return self
+
+    def __exit__(
+        self,
+        error_type: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Finish the files, or remove them after an error."""
+        self._files.__exit__(error_type, error, trace)
+        if error_type is None and self._cells:
+            sheet = draw_contact_sheet(self._cells, self._title)
+            save_picture(sheet, self._folder / 'overlays.png')
+
+    def add_look(self, look: ReplayedFrame, step: Step | None) -> None:
+        """Write prompt, heatmap and overlay of a frame; ``step`` is the newest decision."""
+        stamp_ns = look.frame.stamp_ns
+        values = prompt_pairs(look.prompt)
+        message = diagnostic_array(stamp_ns, 'prompt', _OK, look.prompt.template, values)
+        self._bag.write('/prompt', stamp_ns, message)
+        levels = np.rint(look.heatmap.safety * 255.0).astype(np.uint8)
+        self._bag.write('/heatmap', stamp_ns, mono8_image(levels, stamp_ns))
+        overlay = draw_overlay(look.frame, look.heatmap)
+        self._bag.write('/overlay/compressed', stamp_ns, jpeg_image(overlay, stamp_ns))
+        caption = _caption(step)
+        if self._looks % self._every == 0 and len(self._cells) < _CELLS:
+            self._cells.append(Cell(overlay, caption, look.prompt.template))
+        if self._video is not None:
+            self._video.write(_captioned(overlay, caption))
+        self._looks += 1
+
+    def add_step(self, step: Step) -> None:
+        """Write a decision as ``landing/status``."""
+        decision = step.decision
+        level = _WARN if decision.state.value in _QUIET_STATES else _OK
+        message = diagnostic_array(
+            step.stamp_ns, 'landing', level, decision.reason, decision_pairs(decision, step.pose)
+        )
+        self._bag.write('/landing/status', step.stamp_ns, message)
+
+
+def _caption(step: Step | None) -> str:
+    if step is None:
+        return 'first frame'
+    altitude = '' if step.pose is None else f'  {step.pose.altitude_agl_m:.1f} m'
+    return f'{step.decision.state.value}{altitude}'
+
+
+def _captioned(image: NDArray[np.uint8], caption: str) -> NDArray[np.uint8]:
+    picture: NDArray[np.uint8] = image.copy()
+    canvas.put_text(picture, caption, (8, 20), scale=0.5, outline=True)
+    return picture

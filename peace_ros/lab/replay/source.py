@@ -1,0 +1,252 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where a replay gets its frames and poses: a bag, or a video with an assumed altitude."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+from typing import Protocol
+
+from peace_ros.core.domain import Frame, ImageError, Pose, RecordingError
+from peace_ros.recording import AltitudeProfile, BagReader, VideoReader
+from peace_ros.recording.messages import (
+    IMAGE_TYPES,
+    POSE_TYPES,
+    diagnostic_values,
+    fov_x_rad_of,
+    frame_from_message,
+    pose_from_message,
+    stamp_ns_of,
+)
+from peace_ros.recording.video import VIDEO_SUFFIXES
+
+DEFAULT_FOV_DEG = 73.0
+DEFAULT_ALTITUDE = '100:20'
+_CAMERA_INFO = 'sensor_msgs/msg/CameraInfo'
+_STATUS_TOPIC = '/landing/status'
+_PREFERRED_IMAGES = ('/image', '/image/compressed')
+_PREFERRED_POSES = ('/ground_truth/pose', '/pose')
+
+
+@dataclass(frozen=True)
+class SourceOptions:
+    """Which part of a recording is replayed, and what it does not say itself."""
+
+    image_topic: str | None = None
+    """None takes the only image topic, or ``/image``."""
+    pose_topic: str | None = None
+    """None takes the only pose topic, or ``/ground_truth/pose``."""
+    fov_x_deg: float | None = None
+    """Full horizontal field of view; None takes it from camera_info, otherwise 73."""
+    altitude: str = DEFAULT_ALTITUDE
+    """``START:END`` metres, for videos."""
+    every: int = 1
+    """Take every n-th frame."""
+    hz: float | None = None
+    """Take at most this many frames per second of the recording."""
+    limit: int | None = None
+    """Stop after this many frames."""
+
+    def __post_init__(self) -> None:
+        if self.every < 1:
+            raise RecordingError(f'--every {self.every}: give 1 or more')
+        if self.hz is not None and not 0.0 < self.hz <= 1000.0:
+            raise RecordingError(f'--hz {self.hz}: give more than 0 and at most 1000')
+        if self.limit is not None and self.limit < 1:
+            raise RecordingError(f'--limit {self.limit}: give 1 or more')
+        if self.fov_x_deg is not None and not 5.0 <= self.fov_x_deg <= 150.0:
+            raise RecordingError(f'--fov {self.fov_x_deg} deg: give 5 to 150')
+
+
+@dataclass(frozen=True)
+class Taken:
+    """One frame of a recording, or why it could not be used."""
+
+    stamp_ns: int
+    frame: Frame | None
+    fault: str = ''
+
+
+class RecordingSource(Protocol):
+    """A recording that is being replayed."""
+
+    path: Path
+    count: int
+    """About how many frames :meth:`frames` yields."""
+    fov_x_rad: float
+    poses: list[Pose]
+    """In the order of their stamps."""
+    engage_ns: int | None
+    """When the recorded landing began; None engages with the first frame."""
+
+    def frames(self) -> Iterator[Taken]:
+        """Yield the chosen frames in the order of their stamps."""
+        ...
+
+
+class _Picker:
+    """Which frames are taken, by their number and stamp."""
+
+    def __init__(self, options: SourceOptions) -> None:
+        self._options = options
+        self._seen = 0
+        self._taken = 0
+        self._next_ns: int | None = None
+
+    @property
+    def is_done(self) -> bool:
+        return self._options.limit is not None and self._taken >= self._options.limit
+
+    def takes(self, stamp_ns: int) -> bool:
+        number, self._seen = self._seen, self._seen + 1
+        if number % self._options.every:
+            return False
+        if self._options.hz is not None:
+            if self._next_ns is not None and stamp_ns < self._next_ns:
+                return False
+            period_ns = round(1e9 / self._options.hz)
+            self._next_ns = max(stamp_ns, self._next_ns or stamp_ns) + period_ns
+        self._taken += 1
+        return True
+
+    def about(self, count: int) -> int:
+        count = -(-count // self._options.every)
+        return count if self._options.limit is None else min(count, self._options.limit)
+
+
+class VideoSource:
+    """A video, its camera assumed level above the origin."""
+
+    def __init__(self, path: Path, options: SourceOptions) -> None:
+        self.path = path
+        self._options = options
+        self._reader = VideoReader(path, AltitudeProfile.parse(options.altitude))
+        self.count = _Picker(options).about(self._reader.count)
+        self.fov_x_rad = radians(options.fov_x_deg or DEFAULT_FOV_DEG)
+        self.poses = [self._reader.pose(index) for index in range(self._reader.count)]
+        self.engage_ns: int | None = None
+        self.frame_hz = self._reader.frame_hz / options.every
+
+    def frames(self) -> Iterator[Taken]:
+        """Yield the chosen frames; raises RecordingError when the file breaks off."""
+        picker = _Picker(self._options)
+        for _, frame in self._reader.frames():
+            if picker.takes(frame.stamp_ns):
+                yield Taken(frame.stamp_ns, frame)
+            if picker.is_done:
+                return
+
+
+class BagSource:
+    """An image topic and a pose topic of a bag."""
+
+    def __init__(self, path: Path, options: SourceOptions) -> None:
+        self.path = path
+        self._options = options
+        with BagReader(path) as bag:
+            self.image_topic = _choose(
+                bag, options.image_topic, IMAGE_TYPES, _PREFERRED_IMAGES, '--image-topic'
+            )
+            self.pose_topic = _choose(
+                bag, options.pose_topic, POSE_TYPES, _PREFERRED_POSES, '--pose-topic'
+            )
+            self.count = _Picker(options).about(bag.count(self.image_topic))
+            if not self.count:
+                raise RecordingError(
+                    f'topic {self.image_topic} of bag {path} has 0 messages: choose another'
+                )
+            self.poses = _poses(bag, self.pose_topic)
+            self.fov_x_rad = _field_of_view(bag, options)
+            self.engage_ns = _engaged_ns(bag)
+
+    def frames(self) -> Iterator[Taken]:
+        """Yield the chosen frames; those that cannot be decoded with their fault."""
+        picker = _Picker(self._options)
+        last_ns = -1
+        with BagReader(self.path) as bag:
+            for _, _, message in bag.messages([self.image_topic]):
+                stamp_ns = stamp_ns_of(message)
+                if not picker.takes(stamp_ns):
+                    continue
+                if stamp_ns <= last_ns:
+                    fault = f'stamp {stamp_ns} ns is not after {last_ns} ns'
+                    yield Taken(stamp_ns, None, fault)
+                    continue
+                last_ns = stamp_ns
+                try:
+                    yield Taken(stamp_ns, frame_from_message(message))
+                except ImageError as error:
+                    yield Taken(stamp_ns, None, str(error))
+                if picker.is_done:
+                    return
+
+
+def open_source(path: Path, options: SourceOptions) -> RecordingSource:
+    """Open a bag (folder, ``.mcap``, ``.db3``) or a video file.
+
+    Raises:
+        RecordingError: neither, or the topics that are needed are not in it.
+
+    """
+    if not path.exists():
+        raise RecordingError(f'{path} does not exist: give a bag or a video file')
+    if path.suffix.lower() in VIDEO_SUFFIXES:
+        return VideoSource(path, options)
+    if path.is_dir() or path.suffix in {'.mcap', '.db3'}:
+        return BagSource(path, options)
+    raise RecordingError(
+        f'{path} is neither a bag (folder, .mcap, .db3) nor a video '
+        f'({", ".join(VIDEO_SUFFIXES)}): give one of those'
+    )
+
+
+def _choose(
+    bag: BagReader,
+    given: str | None,
+    types: tuple[str, ...],
+    preferred: tuple[str, ...],
+    option: str,
+) -> str:
+    if given is not None:
+        bag.require(given, types)
+        return given
+    found = [topic for topic in bag.find(types) if bag.count(topic)]
+    for name in preferred:
+        if name in found:
+            return name
+    if len(found) == 1:
+        return found[0]
+    listed = ', '.join(found) or f'none among {", ".join(bag.topics) or "no topics"}'
+    raise RecordingError(f'bag {bag.path}: {option} is not clear, there is {listed}: name one')
+
+
+def _poses(bag: BagReader, topic: str) -> list[Pose]:
+    poses = [pose_from_message(message) for _, _, message in bag.messages([topic])]
+    poses.sort(key=lambda pose: pose.stamp_ns)
+    return [
+        pose
+        for before, pose in zip([None, *poses[:-1]], poses, strict=True)
+        if before is None or pose.stamp_ns > before.stamp_ns
+    ]
+
+
+def _field_of_view(bag: BagReader, options: SourceOptions) -> float:
+    if options.fov_x_deg is not None:
+        return radians(options.fov_x_deg)
+    for topic in bag.find([_CAMERA_INFO]):
+        for _, _, message in bag.messages([topic]):
+            return fov_x_rad_of(message)
+    return radians(DEFAULT_FOV_DEG)
+
+
+def _engaged_ns(bag: BagReader) -> int | None:
+    """Return when a recorded landing node began to act."""
+    if bag.topics.get(_STATUS_TOPIC) != 'diagnostic_msgs/msg/DiagnosticArray':
+        return None
+    for _, _, message in bag.messages([_STATUS_TOPIC]):
+        if diagnostic_values(message).get('state', 'IDLE') != 'IDLE':
+            return stamp_ns_of(message)
+    return None

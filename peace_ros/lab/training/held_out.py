@@ -1,0 +1,82 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``python -m peace_ros.lab.training.held_out``: the photographs that are kept from training.
+
+Writes the annotated ones with ``split: val`` and their labels for `peace evaluate`, which cuts
+them: images/NAME.png, and labels/NAME.png with the ten common indices.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import numpy as np
+import typer
+
+from peace_ros.core.domain import Label, WorldError
+from peace_ros.lab.training.annotations import (
+    LOOSE_SURFACE,
+    NOT_SAFE,
+    OPEN_GROUND,
+    PIXEL_CLASS_COUNT,
+    VEGETATION,
+    load_annotations,
+    rasterise,
+)
+
+_SIDE_PX = 704
+"""Longest of the shorter sides: pixels of all photographs are pooled, and a sharp one is not worth
+more than a coarse one. Two of the network's inputs."""
+_LABELS = np.arange(PIXEL_CLASS_COUNT, dtype=np.uint8)
+# What may be either does not count; all that is certain of NOT_SAFE is that nobody may land on it.
+_LABELS[[VEGETATION, LOOSE_SURFACE]] = Label.UNLABELED
+_LABELS[OPEN_GROUND] = Label.GRASS
+_LABELS[NOT_SAFE] = Label.OBSTACLE
+
+
+def write_held_out(real: Path, out: Path) -> int:
+    """Write photographs and labels and return their number.
+
+    Raises:
+        WorldError: none of the photographs lies in ``ortho`` of the folder.
+    """
+    kept = [each for each in load_annotations() if each.is_validation]
+    paths = [(each, real / 'ortho' / f'{each.name}.jpg') for each in kept]
+    there = [(each, path) for each, path in paths if path.is_file()]
+    if not there:
+        names = ', '.join(each.name for each in kept)
+        raise WorldError(
+            f'{real}/ortho: holds none of {names} (.jpg); their files in config/annotations say '
+            'where to get them'
+        )
+    for folder in ('images', 'labels'):
+        (out / folder).mkdir(parents=True, exist_ok=True)
+    for annotation, path in there:
+        image = cv2.imread(str(path))
+        if image is None:
+            raise WorldError(f'{path}: cannot be read as an image; get it again')
+        scale = min(1.0, _SIDE_PX / min(image.shape[:2]))
+        image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        labels = _LABELS[rasterise(annotation, image.shape[1], image.shape[0])]
+        cv2.imwrite(str(out / 'images' / f'{annotation.name}.png'), image)
+        cv2.imwrite(str(out / 'labels' / f'{annotation.name}.png'), labels)
+    return len(there)
+
+
+def main(
+    real: Annotated[Path, typer.Option(help='Folder of real images, as training takes it.')],
+    out: Annotated[Path, typer.Option(help='Folder that gets images/ and labels/.')],
+) -> None:
+    """Write the photographs that training never sees."""
+    try:
+        count = write_held_out(real, out)
+    except WorldError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(1) from None
+    typer.echo(f'{count} photographs in {out}')
+
+
+if __name__ == '__main__':
+    typer.run(main)

@@ -1,0 +1,243 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The node of the demo: hears every topic, records it, and calls the landing node's service."""
+
+from __future__ import annotations
+
+import struct
+import threading
+import time
+from collections import Counter, OrderedDict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_srvs.srv import Trigger
+
+from peace_ros.core.domain import Frame, PeaceError, Pose, VehicleError
+from peace_ros.nodes import qos
+from peace_ros.nodes.messages import (
+    diagnostic_values,
+    frame_from_message,
+    heatmap_from_image,
+    pose_from_message,
+    stamp_ns,
+)
+from peace_ros.recording.messages import jpeg_image
+from peace_ros.simulation.demo.history import History, Status
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from peace_ros.recording import BagWriter
+
+IMAGE, PROMPT, HEATMAP = '/image', '/prompt', '/heatmap'
+STATUS, POSE = '/landing/status', '/ground_truth/pose'
+CAMERA_POSE = '/pose'
+"""What the camera follows when it is not the ground truth of our own autopilot."""
+ENGAGE = '/landing/engage'
+IMAGE_IN_BAG = '/image/compressed'
+_KEPT_FRAMES = 40
+"""Frames whose heatmap may still come."""
+_LEVEL = (1.0, 0.0, 0.0, 0.0)
+_CDR_STAMP = struct.Struct('<iI')
+
+
+@dataclass(frozen=True)
+class _Topic:
+    name: str
+    message: Any
+    type_name: str
+    profile: QoSProfile
+
+
+_RECORDED = (
+    _Topic('/camera_info', CameraInfo, 'sensor_msgs/msg/CameraInfo', qos.RESULT),
+    _Topic(PROMPT, DiagnosticArray, 'diagnostic_msgs/msg/DiagnosticArray', qos.RESULT),
+    _Topic(HEATMAP, Image, 'sensor_msgs/msg/Image', qos.IMAGE_IN),
+    _Topic('/overlay/compressed', CompressedImage, 'sensor_msgs/msg/CompressedImage', qos.IMAGE_IN),
+    _Topic(STATUS, DiagnosticArray, 'diagnostic_msgs/msg/DiagnosticArray', qos.RESULT),
+    _Topic('/landing/setpoint', TwistStamped, 'geometry_msgs/msg/TwistStamped', qos.RESULT),
+    _Topic('/landing/site', PointStamped, 'geometry_msgs/msg/PointStamped', qos.RESULT),
+    _Topic(POSE, PoseStamped, 'geometry_msgs/msg/PoseStamped', qos.POSE),
+    _Topic(CAMERA_POSE, PoseStamped, 'geometry_msgs/msg/PoseStamped', qos.POSE),
+)
+
+
+class Monitor:
+    """Spins in a thread of its own; everything it knows is read under :attr:`lock`."""
+
+    def __init__(self, writer: BagWriter, *, use_sim_time: bool) -> None:
+        self.lock = threading.Lock()
+        self.history = History()
+        self.counts: Counter[str] = Counter()
+        """Topic -> messages heard."""
+        self._writer = writer
+        self._last_bag_ns = 0
+        self._failure: Exception | None = None
+        rclpy.init(args=[], signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
+        self._node = Node(
+            'demo_monitor', parameter_overrides=[Parameter('use_sim_time', value=use_sim_time)]
+        )
+        for topic in _RECORDED:
+            writer.add_topic(topic.name, topic.type_name)
+            self._subscribe(topic)
+        writer.add_topic(IMAGE_IN_BAG, 'sensor_msgs/msg/CompressedImage')
+        self._waiting: OrderedDict[int, bytes] = OrderedDict()
+        self._node.create_subscription(
+            Image, IMAGE, self._guarded(self._on_image), qos.IMAGE_IN, raw=True
+        )
+        self._engage = self._node.create_client(Trigger, ENGAGE)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, name='monitor', daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop listening; the bag may be closed after this."""
+        self._executor.shutdown()
+        rclpy.try_shutdown()
+        self._thread.join(timeout=5.0)
+
+    def check(self) -> None:
+        """Raise what went wrong in the thread, if anything did."""
+        if self._failure is not None:
+            raise self._failure
+
+    def clock_ns(self) -> int:
+        """Return the node clock."""
+        return int(self._node.get_clock().now().nanoseconds)
+
+    def heard(self, topic: str) -> int:
+        """Return how many messages came on a topic."""
+        with self.lock:
+            return self.counts[topic]
+
+    def engage(self, limit_s: float = 10.0) -> None:
+        """Ask the landing node to take over.
+
+        Raises:
+            VehicleError: it does not answer in time, or refuses; then with its sentence.
+
+        """
+        if not self._engage.wait_for_service(timeout_sec=limit_s):
+            raise VehicleError(f'service {ENGAGE} did not appear within {limit_s:g} s: see the log')
+        future = self._engage.call_async(Trigger.Request())
+        deadline = time.monotonic() + limit_s
+        while not future.done():
+            if time.monotonic() > deadline:
+                raise VehicleError(f'service {ENGAGE} did not answer within {limit_s:g} s')
+            time.sleep(0.01)
+        answer = future.result()
+        if answer is None or not answer.success:
+            reason = answer.message if answer is not None else 'no answer'
+            raise VehicleError(f'the landing node refuses to engage: {reason}')
+        with self.lock:
+            self.history.engaged_ns = self.clock_ns()
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            return
+
+    def _subscribe(self, topic: _Topic) -> None:
+        handle = {
+            PROMPT: self._on_prompt,
+            HEATMAP: self._on_heatmap,
+            STATUS: self._on_status,
+            POSE: self._on_pose,
+            CAMERA_POSE: self._on_pose,
+        }.get(topic.name)
+
+        def store(raw: bytes) -> None:
+            self._writer.write_raw(topic.name, self._bag_ns(), raw)
+            message = deserialize_message(raw, topic.message) if handle is not None else None
+            with self.lock:
+                self.counts[topic.name] += 1
+                if handle is not None:
+                    handle(message)
+
+        self._node.create_subscription(
+            topic.message, topic.name, self._guarded(store), topic.profile, raw=True
+        )
+
+    def _guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Keep the first failure for the main thread; a full disk must end the demo."""
+
+        def call(message: Any) -> None:
+            try:
+                callback(message)
+            except PeaceError as error:
+                self._failure = self._failure or error
+
+        return call
+
+    def _bag_ns(self) -> int:
+        """Return the node clock, never running backwards (it starts at 0 before /clock comes)."""
+        self._last_bag_ns = max(self._last_bag_ns, self.clock_ns())
+        return self._last_bag_ns
+
+    def _on_image(self, raw: bytes) -> None:
+        """Keep the bytes until a heatmap asks for them: most frames are never looked at."""
+        self._waiting[_stamp_ns_of_raw(raw)] = raw
+        while len(self._waiting) > _KEPT_FRAMES:
+            self._waiting.popitem(last=False)
+        with self.lock:
+            self.counts[IMAGE] += 1
+
+    def _frame_of(self, at_ns: int) -> Frame | None:
+        """Return the frame with a stamp and record it; None when it was not heard."""
+        raw = self._waiting.pop(at_ns, None)
+        if raw is None:
+            return None
+        frame = frame_from_message(deserialize_message(raw, Image))
+        self._writer.write(IMAGE_IN_BAG, self._bag_ns(), jpeg_image(frame.image_rgb, at_ns))
+        return frame
+
+    def _on_prompt(self, message: Any) -> None:
+        template = diagnostic_values(message).get('template', '')
+        if template:
+            self.history.add_prompt(template)
+
+    def _on_heatmap(self, message: Any) -> None:
+        heatmap = heatmap_from_image(message)
+        levels = np.rint(heatmap.safety * 255.0).astype(np.uint8)
+        frame = self._frame_of(heatmap.stamp_ns)
+        self.history.add_heatmap(
+            heatmap.stamp_ns, levels, None if frame is None else frame.image_rgb
+        )
+
+    def _on_status(self, message: Any) -> None:
+        sentence = message.status[0].message if message.status else ''
+        status = Status(stamp_ns(message), diagnostic_values(message), sentence)
+        self.history.add_status(status)
+        if not self.counts[POSE] and not self.counts[CAMERA_POSE]:
+            self._add_reported_pose(status)
+
+    def _add_reported_pose(self, status: Status) -> None:
+        """Take the autopilot's own word for the pose, where nobody publishes a better one."""
+        north_m, east_m = status.number('north_m'), status.number('east_m')
+        altitude_m = status.number('altitude_agl_m')
+        if north_m is not None and east_m is not None and altitude_m is not None:
+            self.history.add_pose(
+                Pose(status.stamp_ns, north_m, east_m, -altitude_m, _LEVEL, altitude_m)
+            )
+
+    def _on_pose(self, message: Any) -> None:
+        self.history.add_pose(pose_from_message(message))
+
+
+def _stamp_ns_of_raw(raw: bytes) -> int:
+    """Return the header stamp of a serialised message: it follows 4 bytes of CDR header."""
+    seconds, nanoseconds = _CDR_STAMP.unpack_from(raw, 4)
+    return int(seconds) * 1_000_000_000 + int(nanoseconds)

@@ -1,0 +1,107 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command lines of the five nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from peace_ros.simulation.demo.worlds import DemoWorld
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+CAMERA_HZ = 10.0
+"""Frames per second of the wall clock; more would only be dropped by two cores."""
+
+Arguments = dict[str, list[str]]
+
+MODULES = {
+    'prompt_generator': 'peace_ros.nodes.prompt_generator',
+    'segmentation': 'peace_ros.nodes.segmentation',
+    'landing': 'peace_ros.nodes.landing',
+    'satellite_view': 'peace_ros.simulation.nodes.satellite_view',
+    'autopilot_sim': 'peace_ros.simulation.nodes.autopilot_sim',
+}
+"""Node -> the module that runs it."""
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """How the nodes of one run are connected."""
+
+    world: DemoWorld
+    camera_px: int
+    """Width and height of the camera's image."""
+    preset: Path
+    speed: float
+    mavlink: str
+    """URL for the landing node."""
+    pose_mavlink: str | None
+    """URL for the camera; None: it follows ``ground_truth/pose`` of our own autopilot."""
+    autopilot_port: int | None
+    """UDP port of our own autopilot; None: it is not started."""
+    autopilot: str = 'ardupilot'
+    """Which one our own plays."""
+
+    @property
+    def use_sim_time(self) -> bool:
+        """The nodes take their time from ``/clock`` of our own autopilot."""
+        return self.autopilot_port is not None and self.speed != 1.0
+
+
+def node_arguments(wiring: Wiring) -> Arguments:
+    """Return module name -> command line arguments, in the order in which to start them."""
+    clock = {'use_sim_time': wiring.use_sim_time}
+    arguments: Arguments = {}
+    if wiring.autopilot_port is not None:
+        autopilot = {
+            'autopilot': wiring.autopilot,
+            'port': wiring.autopilot_port,
+            'speed': float(wiring.speed),
+            'publish_clock': wiring.use_sim_time,
+        }
+        arguments['autopilot_sim'] = _ros_arguments(autopilot)
+    camera = {'camera_width': wiring.camera_px, 'camera_height': wiring.camera_px}
+    arguments['satellite_view'] = _ros_arguments({**clock, **camera, **_view(wiring)})
+    arguments['prompt_generator'] = _ros_arguments(clock, wiring.preset)
+    arguments['segmentation'] = _ros_arguments(clock, wiring.preset)
+    arguments['landing'] = _ros_arguments(
+        {**clock, **camera, 'mavlink': wiring.mavlink}, wiring.preset
+    )
+    return arguments
+
+
+def _view(wiring: Wiring) -> dict[str, object]:
+    world = wiring.world
+    view: dict[str, object] = {
+        'world': str(world.image_file),
+        'gsd': float(world.world.gsd_m),
+        'labels': '' if world.label_file is None else str(world.label_file),
+        'start_x': float(world.start_east_m),
+        'start_y': float(world.start_north_m),
+        'rate': CAMERA_HZ / wiring.speed,
+    }
+    if wiring.pose_mavlink is not None:
+        view.update(pose_source='mavlink', pose_mavlink=wiring.pose_mavlink)
+    return view
+
+
+def _ros_arguments(parameters: Mapping[str, object], preset: Path | None = None) -> list[str]:
+    given = ['--ros-args']
+    if preset is not None:
+        given += ['--params-file', str(preset)]
+    for name, value in parameters.items():
+        given += ['-p', f'{name}:={_yaml(value)}']
+    return given
+
+
+def _yaml(value: object) -> str:
+    """Write a value so that ROS reads back the same type."""
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, str):
+        return "'" + value.replace("'", "''") + "'"
+    return repr(value)

@@ -1,0 +1,194 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a user may ask of the demo, refused before anything is started when it makes no sense."""
+
+from __future__ import annotations
+
+import socket
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+
+from peace_ros.core.domain import Camera, ConfigurationError, VehicleError
+from peace_ros.nodes.options import CameraOptions
+from peace_ros.recording.run_folder import create_run_folder
+
+DEFAULT_TIMEOUT_S = 330.0
+"""Longer than the landing searches (max_search_s), so that "no safe place" can be its answer."""
+_SPEED_LIMITS = (0.1, 10.0)
+_GSD_LIMITS_M = (0.01, 5.0)
+AUTOPILOTS = ('ardupilot', 'px4')
+_NETWORK_KINDS = ('udp', 'udpin', 'udpout', 'udpbcast', 'tcp', 'tcpin')
+
+
+@dataclass(frozen=True)
+class DemoOptions:
+    """The options of ``peace demo``."""
+
+    world: Path | None = None
+    """Orthophoto; None draws a world from the seed."""
+    gsd_m: float | None = None
+    """Metres per pixel of the orthophoto."""
+    labels: Path | None = None
+    """Label raster of the orthophoto."""
+    start: tuple[float, float] | None = None
+    """Local origin of the vehicle, metres east and north of the centre of the world."""
+    config: str = 'peace_cs'
+    speed: float | None = None
+    """Simulated seconds per second; None chooses by what the machine can do."""
+    seed: int = 1
+    autopilot: str | None = None
+    """Which one our own simulation plays; None: ArduPilot."""
+    mavlink: str | None = None
+    """URL of an autopilot that is already there."""
+    pose_mavlink: str | None = None
+    """URL on which the camera hears the pose of that autopilot."""
+    camera_px: int = CameraOptions().camera_width
+    """Width and height of the camera's image."""
+    run_dir: Path | None = None
+    """Folder of the results; None: ``runs/<time>-seed<seed>`` where the user stands."""
+    timeout_s: float = DEFAULT_TIMEOUT_S
+    """Wall clock, from the engagement."""
+
+    def __post_init__(self) -> None:
+        self._check_world()
+        self._check_vehicle()
+        if self.speed is not None and not _SPEED_LIMITS[0] <= self.speed <= _SPEED_LIMITS[1]:
+            raise ConfigurationError(
+                f'--speed {self.speed}: give {_SPEED_LIMITS[0]} to {_SPEED_LIMITS[1]}'
+            )
+        if not 10.0 <= self.timeout_s <= 7200.0:
+            raise ConfigurationError(f'--timeout {self.timeout_s} s: give 10 to 7200')
+        if not 64 <= self.camera_px <= 4096:
+            raise ConfigurationError(f'--camera-px {self.camera_px}: give 64 to 4096')
+        if not 0 <= self.seed < 2**31:
+            raise ConfigurationError(f'--seed {self.seed}: give 0 to {2**31 - 1}')
+
+    def _check_world(self) -> None:
+        if self.world is None:
+            for name, value in (('--gsd', self.gsd_m), ('--labels', self.labels)):
+                if value is not None:
+                    raise ConfigurationError(f'{name} {value} belongs to --world FILE: give both')
+            return
+        if not self.world.is_file():
+            raise ConfigurationError(f'--world {self.world}: no such file; give an orthophoto')
+        if self.gsd_m is None:
+            raise ConfigurationError(
+                f'--world {self.world} needs --gsd M: metres of ground per pixel'
+            )
+        if not _GSD_LIMITS_M[0] <= self.gsd_m <= _GSD_LIMITS_M[1]:
+            raise ConfigurationError(
+                f'--gsd {self.gsd_m} m: give {_GSD_LIMITS_M[0]} to {_GSD_LIMITS_M[1]} metres of '
+                'ground per pixel'
+            )
+        if self.labels is not None and not self.labels.is_file():
+            raise ConfigurationError(f'--labels {self.labels}: no such file; give a label raster')
+
+    def _check_vehicle(self) -> None:
+        if self.autopilot not in {None, *AUTOPILOTS}:
+            raise ConfigurationError(
+                f'--autopilot {self.autopilot!r}: choose one of {", ".join(AUTOPILOTS)}'
+            )
+        if self.autopilot is not None and self.mavlink is not None:
+            raise ConfigurationError(
+                f'--autopilot {self.autopilot} with --mavlink: what is connected says itself what '
+                'it is; leave --autopilot out'
+            )
+        if (self.mavlink is None) != (self.pose_mavlink is None):
+            raise ConfigurationError(
+                '--mavlink and --pose-mavlink belong together: the landing node commands over the '
+                'first while the camera follows the pose on the second'
+            )
+        if self.mavlink == self.pose_mavlink and not (self.mavlink or 'udpout:').startswith(
+            'udpout:'
+        ):
+            raise ConfigurationError(
+                f'--pose-mavlink {self.pose_mavlink} is the URL of --mavlink: give a second '
+                'connection'
+            )
+        if self.mavlink is not None and self.speed not in {None, 1.0}:
+            raise ConfigurationError(
+                f'--speed {self.speed} with --mavlink: the clock of a given autopilot cannot be '
+                'changed; leave --speed out'
+            )
+
+    @property
+    def camera(self) -> Camera:
+        """The square camera of the demo."""
+        options = CameraOptions(camera_width=self.camera_px, camera_height=self.camera_px)
+        return options.camera
+
+    @property
+    def own_autopilot(self) -> bool:
+        """The demo brings its own simulated autopilot."""
+        return self.mavlink is None
+
+    def label_file(self) -> Path | None:
+        """Return the label raster given, or the one that lies beside the world."""
+        if self.labels is not None or self.world is None:
+            return self.labels
+        beside = self.world.with_name(f'{self.world.stem}_label.png')
+        return beside if beside.is_file() else None
+
+    def new_run_dir(self) -> Path:
+        """Return the run folder, created.
+
+        Raises:
+            ConfigurationError: it holds something already or cannot be created.
+
+        """
+        now = datetime.now(timezone.utc).strftime('%Y%m%d-%H%M%S')
+        return create_run_folder(self.run_dir, f'{now}-seed{self.seed}', '--run-dir')
+
+
+def parse_start(text: str) -> tuple[float, float]:
+    """Read ``X,Y``: metres east and north of the centre of the world.
+
+    Raises:
+        ConfigurationError: anything else.
+
+    """
+    parts = text.split(',')
+    try:
+        east, north = (float(each) for each in parts)
+    except ValueError as error:
+        raise ConfigurationError(
+            f'--start {text!r}: give X,Y in metres east and north of the centre, e.g. 40,-25'
+        ) from error
+    if not (abs(east) <= 1e5 and abs(north) <= 1e5):
+        raise ConfigurationError(f'--start {text!r}: give at most 100000 m from the centre')
+    return east, north
+
+
+def is_on_this_machine(url: str) -> bool:
+    """Tell whether a MAVLink URL can only mean a peer on this machine.
+
+    A port that is open to the network (``udpin:0.0.0.0:14550``) may bring a real vehicle, and so
+    may a serial line; both are not of this machine.
+    """
+    kind, _, rest = url.partition(':')
+    if kind not in _NETWORK_KINDS:
+        return False
+    host = rest.lstrip('/').rsplit(':', 1)[0].strip('[]')
+    try:
+        found = socket.getaddrinfo(host, None)
+    except OSError:
+        return False
+    addresses = {str(entry[4][0]) for entry in found}
+    return bool(addresses) and all(
+        address == '::1' or address.startswith('127.') for address in addresses
+    )
+
+
+def refuse_to_arm_elsewhere(url: str) -> None:
+    """Refuse to arm a vehicle that may be real.
+
+    Raises:
+        VehicleError: the URL does not stay on this machine.
+
+    """
+    if not is_on_this_machine(url):
+        raise VehicleError(
+            f'the vehicle at {url} is on the ground and not on this machine: a demo arms and takes '
+            'off only over 127.0.0.1; fly it to about 100 m yourself and start the demo again'
+        )

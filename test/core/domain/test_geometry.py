@@ -1,0 +1,128 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Frame conversions, each against what a person can check by hand."""
+
+from math import degrees, radians, tan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from peace_ros.core.domain import Camera, Pose
+from peace_ros.core.domain.geometry import (
+    attitude_enu_flu_to_ned_frd,
+    attitude_ned_frd_to_enu_flu,
+    enu_to_ned,
+    footprint_m,
+    ground_to_image,
+    image_to_ground,
+    interpolate,
+    ned_to_enu,
+    quaternion_from_euler,
+    rotation_matrix,
+    slerp,
+    yaw_from_quaternion,
+)
+
+CAMERA = Camera.from_degrees(352, 352, 73.0)
+ANGLES = st.floats(-3.1, 3.1)
+TILTS = st.floats(-0.5, 0.5)
+
+
+def pose(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0, altitude: float = 100.0) -> Pose:
+    return Pose(0, 0.0, 0.0, -altitude, quaternion_from_euler(roll, pitch, yaw), altitude)
+
+
+def pixel_of(north: float, east: float, at: Pose) -> tuple[float, float]:
+    u, v, depth = ground_to_image(CAMERA, at) @ [north, east, 1.0]
+    return u / depth, v / depth
+
+
+def centre_looks_at(at: Pose) -> tuple[float, float]:
+    n, e, scale = image_to_ground(CAMERA, at) @ [*CAMERA.centre_px, 1.0]
+    return n / scale, e / scale
+
+
+def test_axes_swap_and_up_turns_down() -> None:
+    assert ned_to_enu(1.0, 2.0, 3.0) == (2.0, 1.0, -3.0)
+    assert enu_to_ned(2.0, 1.0, -3.0) == (1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ('yaw_ned_deg', 'yaw_enu_deg'), [(0, 90), (90, 0), (-90, 180), (45, 45), (135, -45)]
+)
+def test_heading_is_counted_from_north_in_ned_and_from_east_in_enu(
+    yaw_ned_deg: float, yaw_enu_deg: float
+) -> None:
+    enu = attitude_ned_frd_to_enu_flu(quaternion_from_euler(0, 0, radians(yaw_ned_deg)))
+    difference = degrees(yaw_from_quaternion(enu)) - yaw_enu_deg
+    assert (difference + 180) % 360 - 180 == pytest.approx(0.0, abs=1e-9)
+
+
+@given(ANGLES, TILTS, ANGLES)
+def test_attitude_survives_the_way_there_and_back(roll: float, pitch: float, yaw: float) -> None:
+    q = quaternion_from_euler(roll, pitch, yaw)
+    back = attitude_enu_flu_to_ned_frd(attitude_ned_frd_to_enu_flu(q))
+    assert np.allclose(rotation_matrix(back), rotation_matrix(q), atol=1e-9)
+
+
+@given(TILTS, TILTS, ANGLES)
+def test_a_body_vector_points_to_the_same_place_in_both_worlds(
+    roll: float, pitch: float, yaw: float
+) -> None:
+    q = quaternion_from_euler(roll, pitch, yaw)
+    in_ned = rotation_matrix(q) @ [1.0, 2.0, 3.0]
+    in_enu = rotation_matrix(attitude_ned_frd_to_enu_flu(q)) @ [1.0, -2.0, -3.0]
+    assert np.allclose(ned_to_enu(*in_ned), in_enu, atol=1e-9)
+
+
+def test_level_camera_sees_north_up_and_east_right() -> None:
+    metres_per_pixel = footprint_m(CAMERA, 100.0)[0] / 352
+    assert pixel_of(0, 0, pose()) == pytest.approx(CAMERA.centre_px)
+    assert pixel_of(10, 0, pose()) == pytest.approx((175.5, 175.5 - 10 / metres_per_pixel))
+    assert pixel_of(0, 10, pose()) == pytest.approx((175.5 + 10 / metres_per_pixel, 175.5))
+
+
+def test_a_vehicle_heading_east_has_east_at_the_top() -> None:
+    u, v = pixel_of(0, 10, pose(yaw=radians(90)))
+    assert u == pytest.approx(175.5)
+    assert v < 175.5
+
+
+def test_a_tilted_camera_looks_elsewhere_by_altitude_times_tangent() -> None:
+    north, east = centre_looks_at(pose(pitch=radians(16)))
+    assert north == pytest.approx(100 * tan(radians(16)))  # nose up sees ahead
+    assert east == pytest.approx(0.0)
+    north, east = centre_looks_at(pose(roll=radians(16)))
+    assert east == pytest.approx(-100 * tan(radians(16)))  # right wing down sees to the left
+    assert north == pytest.approx(0.0)
+
+
+@given(TILTS, TILTS, ANGLES, st.floats(-30, 30), st.floats(-30, 30))
+def test_image_and_ground_are_inverse(
+    roll: float, pitch: float, yaw: float, north: float, east: float
+) -> None:
+    at = pose(roll, pitch, yaw)
+    ground = image_to_ground(CAMERA, at) @ [*pixel_of(north, east, at), 1.0]
+    assert np.allclose(ground[:2] / ground[2], [north, east], atol=1e-6)
+
+
+def test_footprint_is_the_field_of_view_on_the_ground() -> None:
+    across, along = footprint_m(Camera.from_degrees(640, 480, 90.0), 50.0)
+    assert across == pytest.approx(100.0)
+    assert along == pytest.approx(75.0)
+
+
+def test_poses_interpolate_halfway() -> None:
+    before = Pose(0, 0.0, 0.0, -100.0, quaternion_from_euler(0, 0, 0), 100.0)
+    after = Pose(100, 4.0, 2.0, -90.0, quaternion_from_euler(0, 0, 1.0), 90.0)
+    middle = interpolate(before, after, 50)
+    assert (middle.stamp_ns, middle.north_m, middle.altitude_agl_m) == (50, 2.0, 95.0)
+    assert yaw_from_quaternion(middle.quaternion_ned_frd) == pytest.approx(0.5)
+
+
+def test_slerp_takes_the_shorter_arc() -> None:
+    a = quaternion_from_euler(0, 0, radians(170))
+    b = quaternion_from_euler(0, 0, radians(-170))
+    assert abs(degrees(yaw_from_quaternion(slerp(a, b, 0.5)))) == pytest.approx(180.0)

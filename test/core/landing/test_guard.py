@@ -1,0 +1,139 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The guard: only ever makes motion smaller, whatever is asked for."""
+
+from dataclasses import replace
+from math import copysign, hypot, inf, isfinite, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from peace_ros.core.domain import Pose, Setpoint, Site
+from peace_ros.core.landing import LandingParameters
+from peace_ros.core.landing.guard import Guard, GuardInput
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+P = LandingParameters(geofence_radius_m=50.0)
+ASIDE = Site(0.0, 4.6, 6.0, 100.0, 0.9, 0.1)
+
+
+def seen(altitude_m=60.0, north_m=0.0, now_ns=0, telemetry_age_s=0.1, map_age_s=0.1) -> GuardInput:
+    pose = Pose(0, north_m, 0.0, -altitude_m, LEVEL, altitude_m)
+    below = Site(north_m, 0.0, 6.0, 100.0, 0.9, 0.1)
+    return GuardInput(now_ns, pose, telemetry_age_s, map_age_s, (0.0, 0.0), below, 0.9, map_age_s)
+
+
+def limited(wish: Setpoint, given_input: GuardInput, parameters=P):
+    """Ask often enough that the limit of growth is spent."""
+    guard = Guard(parameters)
+    for step in range(40):
+        now_ns = given_input.now_ns + step * 500_000_000
+        given_now = replace(given_input, now_ns=now_ns)
+        result, notes = guard.limit(wish, given_now)
+    return result, notes
+
+
+ANY = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.floats(-10.0, 10.0))
+
+
+@given(
+    wishes=st.lists(st.tuples(ANY, ANY, ANY), min_size=1, max_size=5),
+    altitude_m=ANY,
+    north_m=st.floats(-100.0, 100.0),
+    telemetry_age_s=ANY,
+    map_age_s=ANY,
+    step_ns=st.integers(-(10**9), 10**10),
+)
+def test_every_component_shrinks_towards_zero_and_limits_hold(
+    *, wishes, altitude_m, north_m, telemetry_age_s, map_age_s, step_ns
+):
+    guard, last, now_ns = Guard(P), (0.0, 0.0, 0.0), 0
+    for number, wish in enumerate(wishes):
+        before_ns, now_ns = now_ns, now_ns + step_ns
+        given_input = seen(altitude_m, north_m, now_ns, telemetry_age_s, map_age_s)
+        out, notes = guard.limit(Setpoint(7, *wish), given_input)
+        flown = (out.v_north_m_s, out.v_east_m_s, out.v_down_m_s)
+        elapsed_s = 0.1 if number == 0 else min(0.5, max(0.0, (now_ns - before_ns) * 1e-9))
+        for asked, given_out, previous in zip(wish, flown, last, strict=True):
+            assert isfinite(given_out)
+            if given_out != 0.0:
+                assert copysign(1.0, given_out) == copysign(1.0, asked)
+                assert abs(given_out) <= abs(asked)
+                grown = abs(given_out) - (abs(previous) if previous * given_out > 0.0 else 0.0)
+                assert grown <= P.acceleration_limit * elapsed_s + 1e-9
+        assert hypot(out.v_north_m_s, out.v_east_m_s) <= P.lateral_speed_limit + 1e-9
+        assert -P.z_speed_climbing <= out.v_down_m_s <= P.z_speed_landing
+        if out.v_down_m_s > 0.0:
+            assert altitude_m > P.handover_altitude_m
+            assert map_age_s <= P.descent_heatmap_age_limit_s
+        if not telemetry_age_s <= P.telemetry_age_limit_s:
+            assert out.is_zero
+        assert out.stamp_ns == 7
+        assert notes or flown == wish
+        last = flown
+
+
+@given(north=st.floats(-5, 5), east=st.floats(-5, 5), down=st.floats(-3, 3))
+def test_zero_is_zero_at_once_after_any_motion(north, east, down):
+    guard = Guard(P)
+    for step in range(5):
+        guard.limit(Setpoint(0, north, east, down), seen(now_ns=step * 500_000_000))
+    out, notes = guard.limit(Setpoint(0), seen(now_ns=5 * 500_000_000))
+    assert out.is_zero
+    assert notes == ()
+
+
+def test_a_calm_wish_passes_untouched():
+    wish = Setpoint(3, 1.0, -2.0, 0.5)
+    assert limited(wish, seen()) == (wish, ())
+
+
+@pytest.mark.parametrize(
+    ('wish', 'given_input', 'expected', 'word'),
+    [
+        (Setpoint(0, 9.0, 0.0, 0.0), seen(), (5.0, 0.0, 0.0), 'speed'),
+        (Setpoint(0, 0.0, 0.0, 9.0), seen(), (0.0, 0.0, 3.0), 'speed'),
+        (Setpoint(0, 0.0, 0.0, 2.0), seen(altitude_m=21.0), (0.0, 0.0, 1.0), 'floor'),
+        (Setpoint(0, 0.0, 0.0, 2.0), seen(altitude_m=19.0), (0.0, 0.0, 0.0), 'floor'),
+        (Setpoint(0, 0.0, 0.0, -2.0), seen(altitude_m=19.0), (0.0, 0.0, -2.0), ''),
+        (Setpoint(0, 1.0, 0.0, 2.0), seen(altitude_m=nan), (1.0, 0.0, 0.0), 'altitude'),
+        (Setpoint(0, 1.0, 0.0, 2.0), seen(map_age_s=1.6), (1.0, 0.0, 0.0), 'map'),
+        (Setpoint(0, 1.0, 0.0, 2.0), seen(map_age_s=inf), (1.0, 0.0, 0.0), 'map'),
+        (Setpoint(0, 1.0, 0.0, 2.0), replace(seen(), site=None), (1.0, 0.0, 0.0), 'no site'),
+        (Setpoint(0, 1.0, 0.0, 2.0), replace(seen(), site=ASIDE), (1.0, 0.0, 0.0), 'no site'),
+        (
+            Setpoint(0, 1.0, 0.0, 2.0),
+            replace(seen(), ground_score=0.4),
+            (1.0, 0.0, 0.0),
+            'not safe',
+        ),
+        (
+            Setpoint(0, 1.0, 0.0, 2.0),
+            replace(seen(), ground_score=nan),
+            (1.0, 0.0, 0.0),
+            'not safe',
+        ),
+        (Setpoint(0, 1.0, 0.0, 2.0), replace(seen(), ground_age_s=2.0), (1.0, 0.0, 0.0), 'in view'),
+        (Setpoint(0, 1.0, 0.0, -2.0), replace(seen(), site=None), (1.0, 0.0, -2.0), ''),
+        (Setpoint(0, 1.0, 0.0, 1.0), seen(north_m=nan), (0.0, 0.0, 0.0), 'position'),
+        (Setpoint(0, 1.0, 0.0, 2.0), seen(telemetry_age_s=0.8), (0.0, 0.0, 0.0), 'telemetry'),
+        (Setpoint(0, 3.0, 0.0, 0.0), seen(north_m=51.0), (0.0, 0.0, 0.0), 'fence'),
+        (Setpoint(0, 3.0, 0.0, 0.0), seen(north_m=48.5), (1.0, 0.0, 0.0), 'fence'),
+        (Setpoint(0, -3.0, 0.0, 0.0), seen(north_m=51.0), (-3.0, 0.0, 0.0), ''),
+        (Setpoint(0, nan, 1.0, 1.0), seen(), (0.0, 0.0, 0.0), 'finite'),
+    ],
+)
+def test_each_limit_acts_and_says_so(wish, given_input, expected, word):
+    out, notes = limited(wish, given_input)
+    assert (out.v_north_m_s, out.v_east_m_s, out.v_down_m_s) == pytest.approx(expected)
+    assert word in ' '.join(notes)
+    assert bool(notes) == bool(word)
+
+
+def test_a_turn_from_descent_to_climb_passes_through_no_descent():
+    guard = Guard(P)
+    for step in range(10):
+        guard.limit(Setpoint(0, 0.0, 0.0, 2.0), seen(now_ns=step * 500_000_000))
+    out, _ = guard.limit(Setpoint(0, 0.0, 0.0, -2.0), seen(now_ns=9 * 500_000_000 + 10**8))
+    assert out.v_down_m_s == pytest.approx(-0.3)

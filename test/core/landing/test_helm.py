@@ -1,0 +1,264 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The helm without a map: budgets and their policies, the search, and a way out of every state."""
+
+from dataclasses import dataclass, field, replace
+from math import hypot
+
+import pytest
+
+from peace_ros.core.domain import Pose, Setpoint, Site, Telemetry
+from peace_ros.core.landing import LandingParameters, State, Verdict
+from peace_ros.core.landing.helm import Command, Helm
+from peace_ros.core.landing.lookout import Sighting
+from peace_ros.core.landing.states import STILL_STATES
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+STEP_S = 0.1
+LAWN = Site(20.0, -10.0, 8.0, 200.0, 0.9, 0.2)
+FINAL = {State.IDLE, State.ABORTED, State.HANDOVER}
+
+
+@dataclass
+class Trip:
+    """A vehicle that does at once what it is told, over a lawn or over nothing."""
+
+    parameters: LandingParameters = field(default_factory=LandingParameters)
+    lawn: Site | None = None
+    best: Site | None = None
+    altitude_m: float = 70.0
+    north_m: float = 0.0
+    east_m: float = 0.0
+    battery: float | None = None
+    state: State | None = None
+    time_s: float = 0.0
+    log: list[Command] = field(default_factory=list)
+    lowest_m: float = 1e9
+
+    def __post_init__(self) -> None:
+        self.helm = Helm(self.parameters)
+        if self.state is None:
+            self.helm.engage()
+        else:
+            self.helm = Helm.engaged_in(self.parameters, self.state)
+
+    @property
+    def home_m(self) -> float:
+        return hypot(self.north_m, self.east_m)
+
+    def sighting(self, pose: Pose) -> Sighting:
+        lawn = self.lawn
+        high = pose.altitude_agl_m >= 49.0
+        near = lawn is not None and lawn.distance_m(pose) <= lawn.clearance_m
+        return Sighting(
+            verdict=Verdict.no_zone('nothing') if lawn is None else Verdict.found(lawn),
+            reachable=lawn if high or near else None,
+            ground_is_fresh=near,
+            ground_score=0.9 if near else 0.0,
+            ground_age_s=0.2,
+            stamp_ns=1,
+            map_age_s=0.2,
+            revision=int(self.time_s / 0.2),
+            threshold=0.8,
+            best=self.best,
+        )
+
+    def step(self, **changes) -> Command:
+        now_ns = round((100.0 + self.time_s) * 1e9)
+        pose = Pose(now_ns, self.north_m, self.east_m, -self.altitude_m, LEVEL, self.altitude_m)
+        told = Telemetry(
+            1, pose, armed=True, in_control=True, mode='GUIDED', battery_remaining=self.battery
+        )
+        told = replace(told, **changes)
+        command = self.helm.decide(now_ns, told, 0.05, self.sighting(pose))
+        self.log.append(command)
+        self.fly(command.setpoint)
+        return command
+
+    def fly(self, setpoint: Setpoint) -> None:
+        self.north_m += setpoint.v_north_m_s * STEP_S
+        self.east_m += setpoint.v_east_m_s * STEP_S
+        self.altitude_m -= setpoint.v_down_m_s * STEP_S
+        self.lowest_m = min(self.lowest_m, self.altitude_m)
+        self.time_s += STEP_S
+
+    def run(self, limit_s: float) -> Command:
+        command = self.step()
+        while self.time_s < limit_s and command.outcome is None:
+            command = self.step()
+        return command
+
+    @property
+    def states(self) -> list[State]:
+        found: list[State] = []
+        for command in self.log:
+            if not found or found[-1] is not command.state:
+                found.append(command.state)
+        return found
+
+
+@pytest.mark.parametrize('altitude_m', [30.0, 70.0])
+@pytest.mark.parametrize('state', State)
+def test_from_every_state_good_data_lead_to_the_handover(state, altitude_m):
+    lawn = replace(LAWN, north_m=2.0, east_m=1.0)
+    trip = Trip(lawn=lawn, altitude_m=altitude_m, state=state)
+    if state in FINAL:
+        assert trip.step().state in {state, State.SEARCHING}
+        trip.helm.engage()
+        trip.log.clear()
+    assert trip.run(120.0).outcome == 'handover', trip.states
+    assert 20.0 <= trip.lowest_m <= 20.4
+
+
+@pytest.mark.parametrize('policy', ['hold', 'return', 'best_site'])
+@pytest.mark.parametrize('state', sorted(set(State) - FINAL))
+def test_from_every_state_nothing_safe_leads_to_an_end(state, policy):
+    parameters = LandingParameters(budget_policy=policy, max_search_s=20.0, max_total_s=60.0)
+    trip = Trip(parameters, altitude_m=45.0, state=state)
+    command = trip.run(300.0)
+    assert command.outcome == 'no_zone', trip.states
+    assert command.state is State.HOLD
+    assert trip.lowest_m >= 45.0
+
+
+def test_holding_is_the_end_of_every_budget_unless_told_otherwise():
+    trip = Trip(LandingParameters(max_total_s=10.0), LAWN)
+    command = trip.run(20.0)
+    assert command.state is State.HOLD
+    assert command.outcome == 'timeout'
+    assert 'not landed within 10 s: holding' in command.reason
+    assert all(trip.step().setpoint.is_zero for _ in range(20))
+
+
+def test_returns_to_where_the_landing_began_and_holds_there():
+    parameters = LandingParameters(max_search_s=30.0, budget_policy='return')
+    trip = Trip(parameters, altitude_m=60.0)
+    while trip.helm.state is not State.RETURNING:
+        command = trip.step()
+        assert trip.time_s < 60.0
+    assert command.outcome is None
+    assert 'returning' in command.reason
+    assert trip.home_m > 20.0
+    command = trip.run(120.0)
+    assert command.outcome == 'no_zone'
+    assert command.state is State.HOLD
+    assert trip.home_m < 4.0
+    assert trip.lowest_m >= 60.0
+
+
+def test_a_return_from_below_climbs_before_it_moves():
+    parameters = LandingParameters(max_total_s=10.0, budget_policy='return')
+    trip = Trip(parameters, altitude_m=30.0, north_m=50.0, state=State.HOLD)
+    trip.step()
+    trip.helm._home = Pose(0, 0.0, 0.0, -30.0, LEVEL, 30.0)
+    for _ in range(100):
+        trip.step()
+    trip.altitude_m = 30.0
+    command = trip.step()
+    assert command.state is State.RETURNING
+    assert command.setpoint.v_down_m_s < 0.0
+    assert (command.setpoint.v_north_m_s, command.setpoint.v_east_m_s) == (0.0, 0.0)
+    trip.run(200.0)
+    assert trip.home_m < 4.0
+
+
+def test_a_return_that_cannot_be_flown_ends_too():
+    parameters = LandingParameters(max_total_s=10.0, budget_policy='return', policy_time_s=5.0)
+    trip = Trip(parameters)
+    for _ in range(95):
+        trip.step()
+    trip.fly = lambda _setpoint: setattr(trip, 'time_s', trip.time_s + STEP_S)
+    trip.north_m = 80.0
+    assert trip.run(40.0).outcome == 'no_zone'
+    assert 14.0 < trip.time_s < 17.0
+
+
+def test_without_a_position_there_is_no_return():
+    parameters = LandingParameters(max_total_s=10.0, budget_policy='return')
+    trip = Trip(parameters)
+    for _ in range(150):
+        command = trip.step(pose=None)
+        assert command.setpoint.is_zero
+    assert command.state is State.HOLD
+
+
+def test_the_last_attempt_goes_to_the_best_place_and_lands_by_the_usual_checks():
+    parameters = LandingParameters(max_total_s=10.0, budget_policy='best_site')
+    trip = Trip(parameters, lawn=LAWN)
+    assert trip.run(120.0).outcome == 'handover'
+    assert trip.time_s > 20.0
+    assert hypot(trip.north_m - LAWN.north_m, trip.east_m - LAWN.east_m) < 1.0
+
+
+def test_the_last_attempt_flies_to_a_place_out_of_view_and_never_down_without_a_site():
+    parameters = LandingParameters(max_search_s=8.0, budget_policy='best_site', policy_time_s=60.0)
+    trip = Trip(parameters, best=replace(LAWN, north_m=40.0))
+    command = trip.run(200.0)
+    assert command.outcome == 'no_zone'
+    assert command.state is State.HOLD
+    assert hypot(trip.north_m - 40.0, trip.east_m - LAWN.east_m) < 5.0
+    assert trip.lowest_m >= 70.0
+
+
+def test_a_last_attempt_that_fails_is_the_last():
+    parameters = LandingParameters(max_total_s=10.0, budget_policy='best_site')
+    trip = Trip(parameters, lawn=LAWN, best=LAWN)
+    for _ in range(110):
+        trip.step()
+    trip.helm.fail_attempt()
+    command = trip.step()
+    assert command.state is State.HOLD
+    assert command.outcome == 'timeout'
+
+
+def test_failed_descents_are_limited():
+    trip = Trip(LandingParameters(max_attempts=2), lawn=LAWN)
+    trip.step()
+    trip.helm.fail_attempt()
+    assert trip.step().outcome is None
+    trip.helm.fail_attempt()
+    command = trip.step()
+    assert command.outcome == 'no_zone'
+    assert '2 descents failed, limit 2' in command.reason
+
+
+@pytest.mark.parametrize(
+    ('battery', 'ends'),
+    [(0.31, False), (0.3, True), (0.0, True), (float('nan'), True), (None, False)],
+)
+def test_a_battery_at_its_reserve_ends_the_landing(battery, ends):
+    trip = Trip(LandingParameters(battery_reserve=0.3), lawn=LAWN, battery=battery)
+    command = trip.run(3.0)
+    assert (command.outcome == 'battery') is ends
+    assert ('reserve 30%' in command.reason) is ends
+
+
+def test_the_battery_is_left_to_the_autopilot_unless_a_reserve_is_given():
+    assert Trip(lawn=LAWN, battery=0.0).run(3.0).outcome is None
+
+
+def test_the_way_of_a_search_is_limited():
+    trip = Trip(LandingParameters(search_distance_m=50.0))
+    command = trip.run(100.0)
+    assert command.outcome == 'no_zone'
+    assert '50 m of searching' in command.reason
+    assert 11.0 < trip.time_s < 30.0
+
+
+def test_the_search_stays_within_the_fence():
+    trip = Trip(
+        LandingParameters(geofence_radius_m=50.0, search_spacing_m=30.0, max_search_s=120.0)
+    )
+    farthest_m = 0.0
+    for _ in range(1100):
+        command = trip.step()
+        farthest_m = max(farthest_m, trip.home_m)
+        assert not command.guard_notes or 'fence' not in ' '.join(command.guard_notes)
+    assert 30.0 < farthest_m < 50.0
+
+
+def test_zero_in_every_state_that_stands():
+    for state in STILL_STATES - FINAL:
+        trip = Trip(LandingParameters(giveup_after_s=60.0), state=state)
+        command = trip.step(landed=True)
+        assert command.setpoint.is_zero

@@ -1,0 +1,126 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Heatmaps meet the pose of their stamp; a map whose place is not known is dropped."""
+
+from dataclasses import replace
+from math import nan, radians
+
+import numpy as np
+import pytest
+
+from peace_ros.core.domain import Camera, Heatmap, Pose
+from peace_ros.core.domain.geometry import quaternion_from_euler
+from peace_ros.core.landing import LandingParameters
+from peace_ros.core.landing.intake import HeatmapIntake
+from peace_ros.core.mapping import MapParameters, SafetyMap
+
+S = 1_000_000_000
+CAMERA = Camera.from_degrees(352, 352, 73.0)
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+
+
+def pose_of(time_s, north_m=0.0, altitude_m=50.0, quaternion=LEVEL) -> Pose:
+    return Pose(round(time_s * S), north_m, 0.0, -altitude_m, quaternion, altitude_m)
+
+
+def heatmap_of(time_s, value=0.9) -> Heatmap:
+    return Heatmap(np.full((48, 48), value, np.float32), round(time_s * S))
+
+
+@pytest.fixture
+def safety_map():
+    return SafetyMap(MapParameters(map_size_m=120.0))
+
+
+@pytest.fixture
+def intake(safety_map):
+    """An intake with poses at 10 Hz and a heatmap on each, up to the second second."""
+    intake = HeatmapIntake(LandingParameters(), CAMERA, safety_map)
+    for tick in range(1, 21):
+        intake.add_pose(pose_of(0.1 * tick))
+        intake.add_heatmap(heatmap_of(0.1 * tick))
+        intake.tick(round(0.1 * tick * S))
+    assert intake.counts == {'used': 20}
+    return intake
+
+
+def test_a_heatmap_is_laid_where_the_vehicle_was_at_its_stamp_not_where_it_is(intake, safety_map):
+    """Half a second of inference at 5 m/s is 2.5 m, and a lean of 15 degrees is 13 m."""
+    lean = quaternion_from_euler(0.0, radians(-15.0), 0.0)
+    for tick in range(21, 31):
+        quaternion = lean if tick > 25 else LEVEL
+        intake.add_pose(pose_of(0.1 * tick, 0.5 * (tick - 20), quaternion=quaternion))
+    safety = np.full((352, 352), 0.05, np.float32)
+    safety[166:186, 166:186] = 0.95
+    safety_map.clear()
+    for number in range(4):
+        intake.add_heatmap(Heatmap(safety, round((2.1 + 0.01 * number) * S)))
+    layers = safety_map.layers(3 * S)
+    north, east = layers.centre_of(*np.argwhere(layers.score > 0.5).mean(axis=0))
+    assert (north, east) == pytest.approx((0.58, 0.0), abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ('pose', 'fate'),
+    [
+        (pose_of(2.1, quaternion=quaternion_from_euler(radians(19), 0.0, 0.0)), 'used'),
+        (
+            pose_of(2.1, quaternion=quaternion_from_euler(radians(30), 0.0, 0.0)),
+            'the vehicle turned too far between the poses around it',
+        ),
+        (
+            pose_of(2.1, altitude_m=70.0),
+            'position or altitude jumped between the poses around it',
+        ),
+        (pose_of(2.9), 'poses around it are too far apart'),
+    ],
+)
+def test_what_cannot_be_placed_is_counted_with_its_reason(intake, pose, fate):
+    used = intake.counts['used']
+    intake.add_pose(pose)
+    intake.add_heatmap(heatmap_of(2.05))
+    assert intake.counts[fate] == (used + 1 if fate == 'used' else 1)
+
+
+def test_a_frame_at_too_much_tilt_is_counted(intake):
+    intake.add_pose(pose_of(2.1, quaternion=quaternion_from_euler(radians(45), 0.0, 0.0)))
+    intake.add_heatmap(heatmap_of(2.1))
+    assert intake.counts['taken at too much tilt'] == 1
+
+
+def test_a_position_that_jumps_drops_the_map_and_all_that_is_under_way(intake, safety_map):
+    intake.add_heatmap(heatmap_of(2.05))
+    intake.add_pose(pose_of(2.1, 15.0))
+    assert safety_map.stamp_ns is None
+    assert intake.drops == 1
+    assert 'jumped by 15.0 m' in intake.last_rejection
+    intake.add_heatmap(heatmap_of(2.08))
+    assert safety_map.stamp_ns is None, 'taken before the jump'
+    intake.add_pose(pose_of(2.2, 15.0))
+    intake.add_heatmap(heatmap_of(2.15))
+    assert safety_map.stamp_ns == round(2.15 * S)
+
+
+def test_the_map_outlives_a_short_silence_of_the_position_but_not_a_long_one(intake, safety_map):
+    intake.tick(round(4.9 * S))
+    assert safety_map.stamp_ns is not None
+    intake.tick(round(5.1 * S))
+    assert safety_map.stamp_ns is None
+    assert (intake.drops, intake.counts['map dropped']) == (1, 1)
+    assert 'no position for 3.1 s' in intake.last_rejection
+    intake.tick(round(6.0 * S))
+    assert intake.drops == 1
+    intake.add_pose(pose_of(6.0))
+    intake.add_heatmap(heatmap_of(6.0))
+    intake.tick(round(6.0 * S))
+    assert safety_map.stamp_ns == 6 * S
+
+
+def test_attitude_without_position_places_nothing(intake, safety_map):
+    for tick in range(21, 26):
+        intake.add_pose(replace(pose_of(0.1 * tick), north_m=nan, east_m=nan, down_m=nan))
+        intake.add_heatmap(heatmap_of(0.1 * tick))
+        intake.tick(round(0.1 * tick * S))
+    assert safety_map.stamp_ns == 2 * S
+    assert intake.counts['pose rejected'] == 0
+    assert intake.counts['used'] == 20

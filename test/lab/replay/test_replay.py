@@ -1,0 +1,155 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A replay of the small bag with the bundled models, and the comparison with the stored one."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from peace_ros.core.domain import RecordingError
+from peace_ros.lab.replay import ReplayOptions, SourceOptions, replay
+from peace_ros.lab.replay.compare import Reference, differences, take_reference
+from peace_ros.recording import BagReader, BagWriter, VideoWriter
+from peace_ros.recording.messages import (
+    diagnostic_values,
+    frame_from_message,
+    jpeg_image,
+    pose_stamped,
+    stamp_ns_of,
+)
+
+DATA = Path(__file__).resolve().parents[2] / 'data'
+SMALL = DATA / 'small.mcap'
+EXPECTED = DATA / 'small_expected'
+
+
+def test_the_small_bag_gives_what_it_gave_before() -> None:
+    found = take_reference(SMALL)
+    assert found.was_engaged
+    assert found.safe.any(), 'nothing at all was called safe: the comparison would prove nothing'
+    assert differences(found, Reference.read(EXPECTED)) == []
+
+
+def test_a_replay_writes_the_topics_of_a_flight_with_the_stamps_of_its_frames(tmp_path) -> None:
+    progress = []
+    options = ReplayOptions(SMALL, out=tmp_path / 'out', part=SourceOptions(limit=5))
+    report, folder = replay(options, lambda *told: progress.append(told))
+    assert report.frames == 5
+    assert report.was_engaged
+    assert [told[:2] for told in progress] == [(k, 5) for k in range(1, 6)]
+    assert sorted(each.name for each in folder.iterdir()) == [
+        'overlays.png',
+        'replay.mcap',
+        'summary.json',
+    ]
+    summary = json.loads((folder / 'summary.json').read_text())
+    assert summary['frames'] == 5
+    assert summary['heatmaps']['used'] >= 4
+    with BagReader(folder / 'replay.mcap') as bag:
+        assert set(bag.topics) == {'/heatmap', '/landing/status', '/overlay/compressed', '/prompt'}
+        stamps = {
+            topic: [stamp_ns_of(message) for _, _, message in bag.messages([topic])]
+            for topic in ('/heatmap', '/overlay/compressed', '/prompt')
+        }
+        states = [
+            diagnostic_values(message)['state']
+            for _, _, message in bag.messages(['/landing/status'])
+        ]
+        (_, _, overlay) = next(bag.messages(['/overlay/compressed']))
+    with BagReader(SMALL) as bag:
+        frames = [stamp_ns_of(m) for _, _, m in bag.messages(['/image/compressed'])][:5]
+    assert all(found == frames for found in stamps.values())
+    assert states[0] == 'SEARCHING' or 'HOLD' in states[:2]
+    assert frame_from_message(overlay).image_rgb.shape == (352, 352, 3)
+    assert cv2.imread(str(folder / 'overlays.png')).std() > 10.0
+
+
+def test_the_same_recording_gives_the_same_bytes_of_heatmaps(tmp_path) -> None:
+    found = []
+    for name in ('first', 'second'):
+        part = SourceOptions(limit=3)
+        _, folder = replay(ReplayOptions(SMALL, out=tmp_path / name, part=part))
+        with BagReader(folder / 'replay.mcap') as bag:
+            found.append([m.data.tobytes() for _, _, m in bag.messages(['/heatmap'])])
+    assert found[0] == found[1]
+    assert len(found[0]) == 3
+
+
+def test_a_video_gets_an_overlay_video(tmp_path) -> None:
+    with VideoWriter(tmp_path / 'a.mp4', 5.0) as video:
+        for k in range(6):
+            video.write(np.full((96, 96, 3), 30 * k, np.uint8))
+    options = ReplayOptions(tmp_path / 'a.mp4', out=tmp_path / 'out', part=SourceOptions(every=2))
+    report, folder = replay(options)
+    assert report.frames == 3
+    capture = cv2.VideoCapture(str(folder / 'overlays.mp4'))
+    assert int(capture.get(cv2.CAP_PROP_FRAME_COUNT)) == 3
+    capture.release()
+
+
+def test_nothing_is_written_half_when_no_frame_can_be_used(tmp_path) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        bag.write('/pose', 1, pose_stamped(1, (0.0, 0.0, 50.0), (1.0, 0.0, 0.0, 0.0)))
+        image = jpeg_image(np.zeros((32, 32, 3), np.uint8), 1)
+        image.data = image.data[:30]
+        bag.write('/image', 1, image)
+    with pytest.raises(RecordingError, match='none of 1 frames'):
+        replay(ReplayOptions(tmp_path / 'a.mcap', out=tmp_path / 'out'))
+    assert list((tmp_path / 'out').iterdir()) == []
+
+
+def test_results_go_where_the_user_stands_and_not_beside_the_recording(
+    tmp_path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folders = [ReplayOptions(SMALL).new_folder() for _ in range(2)]
+    assert folders == [tmp_path / 'runs' / 'small_replay', tmp_path / 'runs' / 'small_replay_2']
+
+
+def reference(**changes) -> Reference:
+    safe = np.zeros((4, 10, 10), bool)
+    safe[:, :, :5] = True
+    plain = Reference(
+        (1, 2, 3, 4), ('A {term}.',) * 4, safe, (('SEARCHING', 9), ('AIMING', 20)), True
+    )
+    return replace(plain, **changes)
+
+
+def test_equal_replays_have_no_differences(tmp_path) -> None:
+    reference().write(tmp_path / 'expected')
+    stored = Reference.read(tmp_path / 'expected')
+    assert differences(reference(), stored) == []
+    np.testing.assert_array_equal(stored.safe, reference().safe)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'words'),
+    [
+        ({'was_engaged': False}, 'nothing was engaged'),
+        ({'prompts': ('B {term}.',) * 4}, 'prompts differ'),
+        ({'stamps_ns': (1, 2, 3, 5)}, 'stamps'),
+        ({'states': (('SEARCHING', 29),)}, 'states SEARCHING instead of SEARCHING, AIMING'),
+        ({'states': (('SEARCHING', 9), ('AIMING', 40))}, 'AIMING lasted 40'),
+        ({'safe': np.zeros((4, 10, 10), bool)}, 'overlaps by 0.000'),
+        ({'safe': np.zeros((4, 5, 5), bool)}, 'heatmaps of'),
+    ],
+)
+def test_each_difference_is_told(changes, words) -> None:
+    assert any(words in told for told in differences(reference(**changes), reference()))
+
+
+def test_a_small_difference_of_the_border_is_none() -> None:
+    safe = reference().safe.copy()
+    safe[0, 0, :6] = True
+    assert differences(reference(safe=safe), reference()) == []
+
+
+def test_a_missing_reference_says_how_to_write_it(tmp_path) -> None:
+    with pytest.raises(RecordingError, match='--refresh'):
+        Reference.read(tmp_path / 'expected')
