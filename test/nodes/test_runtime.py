@@ -32,7 +32,6 @@ def start(node: str, *arguments: str) -> subprocess.Popen[str]:
 SLOW_NODE = """
 import sys, time
 from std_msgs.msg import String
-from peace_ros.simulation.demo.nodes import MODULES
 from peace_ros.nodes.runtime import PeaceNode, run
 
 class SlowNode(PeaceNode):
