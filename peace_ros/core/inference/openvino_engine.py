@@ -7,6 +7,8 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _TYPES = {'f32': 'tensor(float)', 'i64': 'tensor(int64)'}
+_REAL = {'f16', 'f32', 'f64'}
 _MOST_COMPILED = 6
 """Sets of outputs and shapes that stay compiled."""
 
@@ -29,12 +32,17 @@ class OpenVinoEngine:
     """
 
     def __init__(self, path: Path, threads: int) -> None:
-        """Read a file; raises RuntimeError when it is no graph."""
+        """Read a file.
+
+        Raises:
+            RuntimeError: It is not a graph, or one of its weights is not a number.
+        """
         import openvino  # noqa: PLC0415 - optional
 
         self._openvino = openvino
         self._core = openvino.Core()
         self._model = self._core.read_model(str(path))
+        self._refuse_damaged_weights()
         self._compiled: dict[Any, Any] = {}
         self._lock = threading.Lock()
         has_bf16 = 'BF16' in self._core.get_property('CPU', 'OPTIMIZATION_CAPABILITIES')
@@ -46,6 +54,18 @@ class OpenVinoEngine:
             # A graph of int8 products has given up more than bf16 takes from the rest of it.
             'INFERENCE_PRECISION_HINT': 'bf16' if has_bf16 and self._is_int8() else 'f32',
         }
+
+    def _refuse_damaged_weights(self) -> None:
+        """NaN must not enter: Relu, Clip and Max of OpenVINO turn it into an ordinary number."""
+        for each in self._model.get_ops():
+            if each.get_type_name() != 'Constant':
+                continue
+            kind = each.get_element_type().get_type_name()
+            if kind in _REAL and np.isnan(each.get_data()).any():
+                raise RuntimeError(
+                    f'weight {each.get_friendly_name()} holds values that are not numbers: '
+                    'export or fetch the model again'
+                )
 
     def _is_int8(self) -> bool:
         return any(each.get_type_name() == 'FakeQuantize' for each in self._model.get_ops())

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from onnx import TensorProto, helper
 
 from peace_ros.core.domain import BundleError, ConfigurationError
 from peace_ros.core.inference import Bundle, ClipEncoder, Session, open_sessions
@@ -122,3 +123,23 @@ def test_an_encoder_tells_where_it_runs_and_what_it_takes(clip_folder: Path) -> 
     assert (footprint.bundle, footprint.providers) == ('clip-tiny', (CPU,))
     assert footprint.threads == 1
     assert 0.0 <= footprint.memory_mb < 1000.0
+
+
+@needs_openvino
+def test_a_network_with_a_weight_that_is_not_a_number_is_refused(tmp_path: Path) -> None:
+    """OpenVINO's Relu would turn it into 0, and nobody would see it in the output."""
+    x = helper.make_tensor_value_info('x', TensorProto.FLOAT, [1, 2])
+    y = helper.make_tensor_value_info('y', TensorProto.FLOAT, [1, 2])
+    weight = helper.make_tensor('weight', TensorProto.FLOAT, [1, 2], [1.0, float('nan')])
+    nodes = [
+        helper.make_node('Mul', ['x', 'weight'], ['z']),
+        helper.make_node('Relu', ['z'], ['y']),
+    ]
+    graph = helper.make_graph(nodes, 'damaged', [x], [y], [weight])
+    path = tmp_path / 'damaged.onnx'
+    opset = [helper.make_opsetid('', 18)]
+    path.write_bytes(
+        helper.make_model(graph, opset_imports=opset, ir_version=9).SerializeToString()
+    )
+    with pytest.raises(BundleError, match=r'damaged\.onnx.*weight weight.*not numbers'):
+        Session(path, providers=(OPENVINO,))
