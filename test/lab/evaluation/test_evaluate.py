@@ -123,7 +123,7 @@ def test_what_cannot_be_scored_is_named_and_not_scored(
     assert 'label value 41 (128 px)' in reasons['value.png']
     assert 'nothing to score' in reasons['blank.png']
     assert 'no label' in reasons['alone.png']
-    assert 'no readable image' in reasons['torn.png']
+    assert 'holds 4 bytes' in reasons['torn.png']
     assert reasons['orphan.png'] == 'a label without an image'
     figures = figures_of(green_cores, outcome.tallies['green'], outcome)
     assert len(figures['skipped']) == 6
