@@ -17,7 +17,6 @@ from peace_ros.core.segmentation import FUSIONS
 from peace_ros.lab.evaluation.segmentation.cores import Cores, Overrides, build_cores
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError
 from peace_ros.lab.evaluation.segmentation.figures import Figures, figures_of, together
-from peace_ros.lab.evaluation.segmentation.html import write_report
 from peace_ros.lab.evaluation.segmentation.inputs import EvaluationInputs, open_source
 from peace_ros.lab.evaluation.segmentation.progress import over_images
 from peace_ros.lab.evaluation.segmentation.run import Outcome
@@ -105,6 +104,9 @@ def evaluate(
         dataset, root, images, labels, manifest, drawn, drawn_seed, drawn_px,
         classes, split, mixed, limit,
     )  # fmt: skip
+    if html is not None:
+        # Before the work, which takes minutes: the page needs an extra.
+        import peace_ros.lab.evaluation.segmentation.html  # noqa: F401
     source = open_source(inputs)
     overrides = Overrides(
         clip=clip,
@@ -212,6 +214,8 @@ def _write(
             json_file.parent.mkdir(parents=True, exist_ok=True)
             json_file.write_text(json.dumps(figures, indent=2) + '\n', encoding='utf-8')
         if html is not None:
+            from peace_ros.lab.evaluation.segmentation.html import write_report
+
             report = write_report(html, named, outcome, configurations, tile_px)
             console.print(f'report: {report}', soft_wrap=True)
     except OSError as error:
