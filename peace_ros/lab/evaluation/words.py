@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +31,7 @@ CONDITIONS: dict[str, str] = {
 }
 """Word -> the condition of ``simulation.drawing`` that it should be said of."""
 FRAME_PX = 352
+Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -66,12 +67,12 @@ class WordFigures:
 
 
 def measure(
-    images_rgb: Sequence[NDArray[np.uint8]],
+    images_rgb: Sequence[Image],
     encoder: ClipEncoder,
     *,
     seed: int = 0,
     strength: float | None = None,
-    report: Callable[[int], None] | None = None,
+    watch: Callable[[Sequence[Image]], Iterable[Image]] = iter,
 ) -> WordFigures:
     """Put every image under every condition and rank the ten words.
 
@@ -80,19 +81,17 @@ def measure(
         encoder: CLIP.
         seed: of the conditions' variation.
         strength: of the conditions, 0 to 1; None varies it between 0.35 and 1.
-        report: gets the number of images done.
+        watch: shows how far it is.
     """
     words = tuple(CONDITIONS)
     texts = encoder.text_embeddings(list(words))
     counts = np.zeros((len(words), len(words)), dtype=np.int64)
-    for number, image in enumerate(images_rgb):
+    for number, image in enumerate(watch(images_rgb)):
         for row, condition in enumerate(CONDITIONS.values()):
             rng = np.random.default_rng([seed, number, row])
             changed = apply_condition(image, condition, rng, strength=strength)
             embedding = encoder.image_embedding(Frame(changed, 0))
             counts[row, int(np.argmax(texts @ embedding))] += 1
-        if report is not None:
-            report(number + 1)
     return WordFigures(words, counts)
 
 
