@@ -37,7 +37,10 @@ setup(
         *(f'{NAME}.{folder}' for folder in SHIPPED),
     ],
     package_dir={f'{NAME}.{folder}': folder for folder in SHIPPED},
-    package_data={f'{NAME}.{folder}': ['**/*'] for folder in SHIPPED},
+    package_data={
+        **{f'{NAME}.{folder}': ['**/*'] for folder in SHIPPED},
+        f'{NAME}.lab.evaluation.segmentation': ['templates/*.j2'],
+    },
     data_files=[
         ('share/ament_index/resource_index/packages', [str(MARKER)]),
         (f'share/{NAME}', ['package.xml']),

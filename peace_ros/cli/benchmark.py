@@ -24,13 +24,9 @@ from peace_ros.lab.benchmark.report import (
 from peace_ros.lab.benchmark.scene import TERMS_13
 from peace_ros.lab.benchmark.sweep import sweep as run_sweep
 from peace_ros.lab.benchmark.sweep import sweep_table
-from peace_ros.lab.benchmark.worker import measure_apart
+from peace_ros.lab.benchmark.worker import run_apart
 
 _CACHE = '~/.cache/peace_ros/benchmark'
-_CLIPSEG = 'peace_ros.lab.benchmark.clipseg'
-_REFERENCE = 'peace_ros.lab.benchmark.reference:measure_reference'
-_FASTSAM = 'peace_ros.lab.benchmark.fastsam:measure_fastsam'
-_FASTSAM_REFERENCE = 'peace_ros.lab.benchmark.fastsam_reference:measure_reference'
 _RANDOM = 'random'
 _QUICK_CALLS = 8
 """Of one CLIP call per segment, those that are made with --quick; all take the same."""
@@ -100,19 +96,19 @@ def benchmark(
     clip = clip or str(random['clip-vit-b-32-int8'])
     conditions = describe_machine(threads, len(TERMS_13))
     frames = 30 if quick else 60
-    setup = {'clipseg': clipseg, 'clip': clip, 'threads': threads}
+    setup = {'bundle': clipseg, 'clip': clip, 'threads': threads}
     typer.echo(f'{conditions}\ntiming peace_ros on {provider} ...')
-    ours = _measure('ours', **setup, provider=provider, frames=frames)
-    plain = {**setup, 'clipseg': fp32, 'provider': CPU}
+    ours = _measure('ours:measure_ours', **setup, provider=provider, frames=frames)
+    plain = {**setup, 'bundle': fp32, 'provider': CPU}
     typer.echo('measuring the memory of fp32 ...')
-    memory = _measure('memory', **plain, frames=3)
+    memory = _measure('ours:measure_memory', **plain, frames=3)
     typer.echo("timing BlabberSeg's way ...")
-    blabberseg = _measure('blabberseg', **plain, frames=5 if quick else 15)
+    blabberseg = _measure('ours:measure_blabberseg', **plain, frames=5 if quick else 15)
     slow = None
     if reference:
         typer.echo('timing the reference path ...')
-        slow = measure_apart(
-            _REFERENCE,
+        slow = _measure(
+            'reference:measure_clipseg',
             source=source,
             clip_source=clip_source,
             tokenizer_bundle=clipseg,
@@ -124,7 +120,7 @@ def benchmark(
     text = markdown(ways, figures, conditions)
     found: dict[str, Any] = {'clipseg': figures, 'conditions': conditions}
     if fastsam:
-        setup = {'fastsam': str(random['fastsam-s-fp32']), 'threads': threads}
+        setup = {'bundle': str(random['fastsam-s-fp32']), 'threads': threads}
         measured = _measure_fastsam(setup, clip, provider, quick=quick, with_reference=reference)
         found['fastsam'] = fastsam_figures(*measured)
         ways = [way for way in measured if way is not None]
@@ -157,13 +153,13 @@ def _measure_fastsam(
     """Return what ours took, the reference, and the reference without texts."""
     typer.echo('timing FastSAM ...')
     how_long = {'frames': 8, 'parts': 3} if quick else {'frames': 20, 'parts': 5}
-    ours = measure_apart(_FASTSAM, **setup, clip=clip, provider=provider, **how_long)
+    ours = _measure('ours:measure_ours', **setup, clip=clip, provider=provider, **how_long)
     if not with_reference:
         return ours, None, None
     typer.echo('timing one CLIP call per segment ...')
     slow, images = (
-        measure_apart(
-            _FASTSAM_REFERENCE,
+        _measure(
+            'reference:measure_fastsam',
             **setup,
             count=2,
             calls=_QUICK_CALLS if quick else SEGMENTS,
@@ -180,7 +176,8 @@ def _fastest() -> str:
 
 
 def _measure(name: str, **arguments: Any) -> Measured:
-    return measure_apart(f'{_CLIPSEG}:measure_{name}', **arguments)
+    measured: Measured = run_apart(f'peace_ros.lab.benchmark.{name}', **arguments)
+    return measured
 
 
 def _write_json(file: Path, figures: dict[str, Any]) -> None:

@@ -1,69 +1,100 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Options that commands over labelled images share."""
+"""Options that commands over labelled images share, declared once as the fields of a class."""
 
 from __future__ import annotations
 
+import functools
+import inspect
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_type_hints
 
-import typer
+from typer import Option
 
-from peace_ros.lab.evaluation.segmentation.classes import MIXED, dataset_names
+from peace_ros.lab.evaluation.segmentation.cores import Overrides
+from peace_ros.lab.evaluation.segmentation.errors import DatasetError
+from peace_ros.lab.evaluation.segmentation.inputs import EvaluationInputs, open_source
+from peace_ros.lab.evaluation.segmentation.samples import SampleSource
+from peace_ros.lab.evaluation.segmentation.tiles import WHOLE
 
-DatasetName = Annotated[
-    str, typer.Option(metavar='NAME', help=f'One of {", ".join(dataset_names())}; needs --root.')
-]
-Root = Annotated[Path | None, typer.Option(metavar='DIR', help='Where the dataset was unpacked.')]
-Images = Annotated[
-    Path | None, typer.Option(metavar='DIR', help='Folder of images; needs --labels.')
-]
-Labels = Annotated[
-    Path | None, typer.Option(metavar='DIR', help='Folder of label PNGs, same stems.')
-]
-Manifest = Annotated[
-    Path | None, typer.Option(metavar='FILE', help='CSV with columns image, label, split.')
-]
-Drawn = Annotated[int, typer.Option(metavar='N', min=0, help='Draw N scenes.')]
-DrawnSeed = Annotated[
-    int | None, typer.Option(metavar='SEED', min=0, help='First seed of the drawn scenes.')
-]
-DrawnPx = Annotated[
-    int,
-    typer.Option(metavar='N', min=64, max=4096, help='Side of the camera that sees the scenes.'),
-]
-MaxLooks = Annotated[
-    int,
-    typer.Option(
-        metavar='N',
-        min=0,
-        help='Looks per tile, *_cs; 1: whole only, 0: as dataset and preset say.',
-    ),
-]
-ClassTable = Annotated[
-    str, typer.Option(metavar='NAME|FILE', help='Class table of --labels and --manifest.')
-]
-Split = Annotated[str, typer.Option(help='Only this split of the dataset or manifest.')]
-Mixed = Annotated[
-    str, typer.Option(help=f'Classes of safe and unsafe ground alike: {", ".join(MIXED)}.')
-]
-Limit = Annotated[
-    int | None, typer.Option(metavar='N', min=1, help='At most N images, evenly spread.')
-]
-TilePx = Annotated[
-    int | None,
-    typer.Option(metavar='N', min=16, help='Side of the squares; default the shorter side.'),
-]
-Whole = Annotated[
-    bool, typer.Option('--whole', help='Whole frames, stretched as the node does it.')
-]
-TermsFile = Annotated[str, typer.Option(metavar='FILE', help='Terms in place of the preset.')]
-ClipBundle = Annotated[str, typer.Option(metavar='BUNDLE', help='CLIP that ranks words.')]
-ClipSegBundle = Annotated[str, typer.Option(metavar='BUNDLE', help='CLIPSeg of *_cs.')]
-Threads = Annotated[int, typer.Option(min=1, max=64, help='CPU threads.')]
-Strict = Annotated[
-    bool, typer.Option('--strict', help='Refuse at the first image that cannot be scored.')
-]
-JsonFile = Annotated[
-    Path | None, typer.Option('--json', metavar='FILE', help='Write the figures here.')
-]
+
+@dataclass(frozen=True)
+class ImageOptions(EvaluationInputs):
+    """Which images, how they are cut, and the models that see them."""
+
+    tile_px: Annotated[
+        int | None,
+        Option(metavar='N', min=16, help='Side of the squares; default the shorter side.'),
+    ] = None
+    whole: Annotated[
+        bool, Option('--whole', help='Whole frames, stretched as the node does it.')
+    ] = False
+    max_looks: Annotated[
+        int,
+        Option(
+            metavar='N',
+            min=0,
+            help='Looks per tile, *_cs; 1: whole only, 0: as dataset and preset say.',
+        ),
+    ] = 0
+    terms: Annotated[str, Option(metavar='FILE', help='Terms in place of the preset.')] = ''
+    clip: Annotated[str, Option(metavar='BUNDLE', help='CLIP that ranks words.')] = ''
+    clipseg: Annotated[str, Option(metavar='BUNDLE', help='CLIPSeg of *_cs.')] = ''
+    threads: Annotated[int, Option(min=1, max=64, help='CPU threads.')] = 2
+    strict: Annotated[
+        bool, Option('--strict', help='Refuse at the first image that cannot be scored.')
+    ] = False
+    json_file: Annotated[
+        Path | None, Option('--json', metavar='FILE', help='Write the figures here.')
+    ] = None
+
+    @property
+    def side_px(self) -> int | None:
+        """Side of the tiles, as :func:`tiles_of` takes it."""
+        return WHOLE if self.whole else self.tile_px
+
+    def open(self, **overrides: Any) -> tuple[SampleSource, Overrides]:
+        """Return the images, and what is set in place of the presets; raises DatasetError."""
+        source = open_source(self)
+        return source, Overrides(
+            clip=self.clip,
+            clipseg=self.clipseg,
+            terms=self.terms,
+            max_looks=self.max_looks or source.max_looks,
+            threads=self.threads,
+            **overrides,
+        )
+
+    def write(self, figures: dict[str, Any], also: Callable[[], None]) -> None:
+        """Write the figures where --json says, and what else there is; raises DatasetError."""
+        try:
+            if self.json_file is not None:
+                self.json_file.parent.mkdir(parents=True, exist_ok=True)
+                self.json_file.write_text(json.dumps(figures, indent=2) + '\n', encoding='utf-8')
+            also()
+        except OSError as error:
+            raise DatasetError(f'{error.filename} cannot be written: {error.strerror}') from error
+
+
+def with_image_options(verb: Callable[..., None]) -> Callable[..., None]:
+    """Give a verb the fields of ImageOptions as options; it gets them as ``options``."""
+
+    @functools.wraps(verb)
+    def run(**given: Any) -> None:
+        names = [each.name for each in fields(ImageOptions)]
+        verb(options=ImageOptions(**{name: given.pop(name) for name in names}), **given)
+
+    kind, hints = inspect.Parameter.KEYWORD_ONLY, get_type_hints(ImageOptions, include_extras=True)
+    shared = [
+        inspect.Parameter(each.name, kind, default=each.default, annotation=hints[each.name])
+        for each in fields(ImageOptions)
+    ]
+    own = dict(inspect.signature(verb, eval_str=True).parameters)
+    del own['options']
+    parameters = [*own.values(), *shared]
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
+    return run

@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import track
 from rich.table import Table
 
 from peace_ros.core.inference import Bundle, ClipEncoder
@@ -34,15 +35,8 @@ def words(
     frames = load_frames(images)[:limit]
     encoder = ClipEncoder(Bundle.load(clip))
     console = Console()
-    with Progress(console=console, transient=True) as progress:
-        task = progress.add_task('images', total=len(frames))
-        figures = measure(
-            frames,
-            encoder,
-            seed=seed,
-            strength=strength,
-            report=lambda done: progress.update(task, completed=done),
-        )
+    watch = partial(track, description='images', console=console, transient=True)
+    figures = measure(frames, encoder, seed=seed, strength=strength, watch=watch)
     table = Table('condition', 'named first', 'most often taken for')
     for row, (word, share) in enumerate(figures.right_by_word.items()):
         others = figures.counts[row].copy()

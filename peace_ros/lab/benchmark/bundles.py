@@ -5,17 +5,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from peace_ros.core.domain import BundleError
 from peace_ros.core.inference import Bundle
 from peace_ros.lab.benchmark.worker import run_apart
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
 
 NAMES = ('clipseg-rd64-fp32', 'clipseg-rd64-int8', 'clip-vit-b-32-int8', 'fastsam-s-fp32')
 FASTSAM_CLIP = 'clip-vit-b-32-int8'

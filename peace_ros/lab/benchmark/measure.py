@@ -8,12 +8,17 @@ import resource
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+
+from peace_ros.core.domain import Frame
+
+Stage = Callable[[str], AbstractContextManager[None]]
+"""Times one run of a named stage."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,12 @@ class Stopwatch:
         self.processor_ms[name].append((time.process_time() - start_processor) * 1e3)
         self.times_ms[name].append((time.perf_counter() - start) * 1e3)
 
+    def warmed(self, frames: Sequence[Frame]) -> Iterator[tuple[Frame, Stage]]:
+        """Yield each frame with what times its stages; the first comes before that, not timed."""
+        yield frames[0], Stopwatch().stage
+        for frame in frames:
+            yield frame, self.stage
+
     def processor_p50(self, name: str) -> float:
         """Return the median processor time of a stage, milliseconds."""
         return float(np.median(self.processor_ms[name]))
@@ -55,6 +66,18 @@ class Stopwatch:
     def spreads(self) -> dict[str, Spread]:
         """Return stage -> how long it took."""
         return {name: Spread.of(times) for name, times in self.times_ms.items()}
+
+    def measured(self, name: str, conditions: str, **extra: Any) -> Measured:
+        """Return what was timed up to now, with the memory in use up to now."""
+        return Measured(
+            name,
+            conditions,
+            self.spreads(),
+            len(self.times_ms['frame']),
+            peak_rss_mb(),
+            self.processor_p50('frame'),
+            extra,
+        )
 
 
 @dataclass(frozen=True)
@@ -71,16 +94,6 @@ class Measured:
     """Processor time of a frame, median; beside the wall clock it tells a busy machine."""
     extra: dict[str, Any] = field(default_factory=dict)
     """Figures that only this way has."""
-
-    def as_json(self) -> dict[str, Any]:
-        """Return plain values."""
-        return asdict(self)
-
-    @classmethod
-    def from_json(cls, values: dict[str, Any]) -> Measured:
-        """Read what :meth:`as_json` gave."""
-        stages = {name: Spread(**each) for name, each in values.pop('stages_ms').items()}
-        return cls(stages_ms=stages, **values)
 
 
 def peak_rss_mb() -> float:

@@ -6,16 +6,18 @@ from __future__ import annotations
 
 import os
 import platform
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
 
 import onnxruntime as ort
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from peace_ros.lab.benchmark.measure import Measured
+from peace_ros.lab.benchmark.measure import Measured
 
 Figures = dict[str, Any]
+
+
+NO_BLABBERSEG = 'BlabberSeg is a scheme for CLIPSeg; there is none of FastSAM to compare with'
 
 
 def clipseg_figures(
@@ -25,40 +27,19 @@ def clipseg_figures(
     blabberseg: Measured | None,
 ) -> Figures:
     """Return the ``clipseg`` object; figures whose measurement was not asked for are None."""
-    frame = ours.stages_ms['frame']
-    extra = ours.extra
-
-    def ratio(other: Measured | None) -> float | None:
-        return None if other is None else other.stages_ms['frame'].p50 / frame.p50
-
-    def busy_ratio(other: Measured | None) -> float | None:
-        return None if other is None else other.processor_ms / ours.processor_ms
-
     return {
-        'frame_ms_p50': frame.p50,
-        'frame_ms_p95': frame.p95,
-        'speedup_vs_reference': ratio(reference),
-        'speedup_vs_blabberseg': ratio(blabberseg),
-        'cost_39_over_13_terms': extra['cost_39_over_13_terms'],
-        'cost_per_further_term': extra['cost_per_term'],
-        'dynamic_prompt_share': extra['dynamic_prompt_share'],
+        **_figures(ours, memory, reference, blabberseg),
+        'speedup_vs_reference': _ratio(reference, ours),
+        'speedup_vs_blabberseg': _ratio(blabberseg, ours),
+        'processor_time_vs_blabberseg': _busy_ratio(blabberseg, ours),
+        'processor_time_vs_reference': _busy_ratio(reference, ours),
+        'cost_per_further_term': ours.extra['cost_per_term'],
         'peak_rss_mb': (memory or ours).peak_rss_mb,
         'peak_rss_mb_of_all': ours.peak_rss_mb,
-        'calls_per_frame': extra['steady_calls'],
-        'calls_per_frame_with_dynamic_prompts': extra['calls_per_frame'],
-        'processor_ms_p50': ours.processor_ms,
-        'processor_time_vs_reference': busy_ratio(reference),
-        'processor_time_vs_blabberseg': busy_ratio(blabberseg),
-        'frames_per_s': 1e3 / frame.mean,
-        'ranking_ms': extra['ranking_ms'],
-        'prompts': extra['prompts'],
-        'ways': [
-            each.as_json() for each in (ours, memory, reference, blabberseg) if each is not None
-        ],
+        'calls_per_frame_with_dynamic_prompts': ours.extra['calls_per_frame'],
+        'ranking_ms': ours.extra['ranking_ms'],
+        'prompts': ours.extra['prompts'],
     }
-
-
-NO_BLABBERSEG = 'BlabberSeg is a scheme for CLIPSeg; there is none of FastSAM to compare with'
 
 
 def fastsam_figures(
@@ -71,30 +52,38 @@ def fastsam_figures(
         reference: one CLIP call per segment, with the texts in each.
         images_only: the same without the texts.
     """
+    return {
+        **_figures(ours, reference, images_only),
+        'speedup_vs_reference': _ratio(reference, ours),
+        'speedup_vs_reference_without_texts': _ratio(images_only, ours),
+        'processor_time_vs_reference': _busy_ratio(reference, ours),
+        'speedup_vs_blabberseg': None,
+        'speedup_vs_blabberseg_reason': NO_BLABBERSEG,
+        'segments_per_frame': ours.extra['segments_per_frame'],
+    }
+
+
+def _figures(ours: Measured, *others: Measured | None) -> Figures:
     frame = ours.stages_ms['frame']
-
-    def ratio(other: Measured | None) -> float | None:
-        return None if other is None else other.stages_ms['frame'].p50 / frame.p50
-
     return {
         'frame_ms_p50': frame.p50,
         'frame_ms_p95': frame.p95,
-        'speedup_vs_reference': ratio(reference),
-        'speedup_vs_reference_without_texts': ratio(images_only),
-        'processor_time_vs_reference': (
-            None if reference is None else reference.processor_ms / ours.processor_ms
-        ),
-        'speedup_vs_blabberseg': None,
-        'speedup_vs_blabberseg_reason': NO_BLABBERSEG,
+        'frames_per_s': 1e3 / frame.mean,
+        'processor_ms_p50': ours.processor_ms,
         'cost_39_over_13_terms': ours.extra['cost_39_over_13_terms'],
         'dynamic_prompt_share': ours.extra['dynamic_prompt_share'],
         'peak_rss_mb': ours.peak_rss_mb,
         'calls_per_frame': ours.extra['steady_calls'],
-        'segments_per_frame': ours.extra['segments_per_frame'],
-        'processor_ms_p50': ours.processor_ms,
-        'frames_per_s': 1e3 / frame.mean,
-        'ways': [each.as_json() for each in (ours, reference, images_only) if each is not None],
+        'ways': [asdict(each) for each in (ours, *others) if each is not None],
     }
+
+
+def _ratio(other: Measured | None, ours: Measured) -> float | None:
+    return None if other is None else other.stages_ms['frame'].p50 / ours.stages_ms['frame'].p50
+
+
+def _busy_ratio(other: Measured | None, ours: Measured) -> float | None:
+    return None if other is None else other.processor_ms / ours.processor_ms
 
 
 def markdown(ways: Sequence[Measured], figures: Figures, conditions: str) -> str:

@@ -22,6 +22,7 @@ _MORE = (
     'lane', 'stairs', 'steps', 'crane', 'boat', 'tower', 'bridge',
 )  # fmt: skip
 TERMS_13 = Terms(_POSITIVE, _NEGATIVE)
+IS_POSITIVE_13 = np.array([1.0] * len(_POSITIVE) + [0.0] * len(_NEGATIVE), np.float32)
 TERMS_39 = Terms(_POSITIVE, _NEGATIVE + _MORE)
 
 

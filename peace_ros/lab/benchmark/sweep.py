@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -19,11 +20,8 @@ from peace_ros.core.inference.contract import (
 from peace_ros.core.inference.providers import CPU, OPENVINO, available_providers
 from peace_ros.core.inference.session import OPTIMISATIONS
 from peace_ros.lab.benchmark.measure import Stopwatch, peak_rss_mb
-from peace_ros.lab.benchmark.scene import TERMS_13, draw_frames
+from peace_ros.lab.benchmark.scene import IS_POSITIVE_13, TERMS_13, draw_frames
 from peace_ros.lab.benchmark.worker import run_apart
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
 
 Row = dict[str, Any]
 
@@ -85,17 +83,14 @@ def measure_setting(bundle: str, provider: str, threads: int, optimisation: str)
     names = [each.name for each in encoder.graph.outputs]
     sizes = (len(TERMS_13), opened.manifest.embedding_width)
     texts = np.random.default_rng(0).normal(size=sizes).astype(np.float32)
-    side = np.array([1.0] * len(TERMS_13.positive) + [0.0] * len(TERMS_13.negative), np.float32)
-    frames = draw_frames(_FRAMES)
     watch = Stopwatch()
-    for index, frame in enumerate([frames[0], *frames]):
-        clock = watch if index else Stopwatch()
+    for frame, stage in watch.warmed(draw_frames(_FRAMES)):
         pixels = preprocess(frame.image_rgb)
-        with clock.stage('encoder'):
+        with stage('encoder'):
             features = encoder.run(names, {PIXEL_VALUES: pixels})
         feeds = dict(zip(names, features, strict=True))
-        feeds.update({TEXT_EMBEDDING: texts, IS_POSITIVE: side})
-        with clock.stage('decoder'):
+        feeds.update({TEXT_EMBEDDING: texts, IS_POSITIVE: IS_POSITIVE_13})
+        with stage('decoder'):
             decoder.run([POSITIVE, NEGATIVE], feeds)
     spreads = watch.spreads()
     return {

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from peace_ros.core.domain import ConfigurationError, Frame
 from peace_ros.core.inference import ClipEncoder
 from peace_ros.simulation.drawing import apply_condition
+from peace_ros.simulation.rasters import IMAGE_SUFFIXES, read_photo
 
 CONDITIONS: dict[str, str] = {
     'clear': 'clear',
@@ -30,7 +31,7 @@ CONDITIONS: dict[str, str] = {
 }
 """Word -> the condition of ``simulation.drawing`` that it should be said of."""
 FRAME_PX = 352
-_SUFFIXES = {'.jpg', '.jpeg', '.png', '.tif', '.tiff', '.bmp'}
+Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -66,12 +67,12 @@ class WordFigures:
 
 
 def measure(
-    images_rgb: Sequence[NDArray[np.uint8]],
+    images_rgb: Sequence[Image],
     encoder: ClipEncoder,
     *,
     seed: int = 0,
     strength: float | None = None,
-    report: Callable[[int], None] | None = None,
+    watch: Callable[[Sequence[Image]], Iterable[Image]] = iter,
 ) -> WordFigures:
     """Put every image under every condition and rank the ten words.
 
@@ -80,19 +81,17 @@ def measure(
         encoder: CLIP.
         seed: of the conditions' variation.
         strength: of the conditions, 0 to 1; None varies it between 0.35 and 1.
-        report: gets the number of images done.
+        watch: shows how far it is.
     """
     words = tuple(CONDITIONS)
     texts = encoder.text_embeddings(list(words))
     counts = np.zeros((len(words), len(words)), dtype=np.int64)
-    for number, image in enumerate(images_rgb):
+    for number, image in enumerate(watch(images_rgb)):
         for row, condition in enumerate(CONDITIONS.values()):
             rng = np.random.default_rng([seed, number, row])
             changed = apply_condition(image, condition, rng, strength=strength)
             embedding = encoder.image_embedding(Frame(changed, 0))
             counts[row, int(np.argmax(texts @ embedding))] += 1
-        if report is not None:
-            report(number + 1)
     return WordFigures(words, counts)
 
 
@@ -100,21 +99,20 @@ def load_frames(folder: Path) -> list[NDArray[np.uint8]]:
     """Return the middle square of every image of a folder and those below, 352 x 352.
 
     Raises:
-        ConfigurationError: there is no image, or one cannot be read.
+        ConfigurationError: there is no image.
+        RasterError: an image cannot be read.
     """
-    paths = sorted(path for path in folder.rglob('*') if path.suffix.lower() in _SUFFIXES)
+    paths = sorted(path for path in folder.rglob('*') if path.suffix.lower() in IMAGE_SUFFIXES)
     if not paths:
-        raise ConfigurationError(f'{folder}: no image ({", ".join(sorted(_SUFFIXES))}) in it')
+        raise ConfigurationError(f'{folder}: no image ({", ".join(IMAGE_SUFFIXES)}) in it')
     return [_frame(path) for path in paths]
 
 
 def _frame(path: Path) -> NDArray[np.uint8]:
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if image is None:
-        raise ConfigurationError(f'{path}: cannot be read as an image; remove it or repair it')
+    image = read_photo(path).rgb
     side = min(image.shape[:2])
     top, left = (image.shape[0] - side) // 2, (image.shape[1] - side) // 2
-    square = image[top : top + side, left : left + side, ::-1]
+    square = image[top : top + side, left : left + side]
     small = cv2.resize(
         np.ascontiguousarray(square), (FRAME_PX, FRAME_PX), interpolation=cv2.INTER_AREA
     )

@@ -4,12 +4,8 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
-from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 
@@ -21,7 +17,6 @@ from peace_ros.lab.evaluation.segmentation.classes import (
     read_yaml,
 )
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError, SampleError
-from peace_ros.lab.evaluation.segmentation.rasters import read_colours, read_image, read_indices
 
 
 def table_of(name: str) -> Any:
@@ -95,59 +90,3 @@ def test_two_classes_of_one_index_are_refused() -> None:
 def test_unknown_tables_are_refused_with_the_known_ones() -> None:
     with pytest.raises(DatasetError, match=r"'nowhere' does not exist.*common.*uavid"):
         find_table('nowhere')
-
-
-def write_palette_png(path: Path, indices: Any, palette: list[tuple[int, int, int]]) -> None:
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        check = struct.pack('>I', zlib.crc32(kind + data))
-        return struct.pack('>I', len(data)) + kind + data + check
-
-    height, width = indices.shape
-    header = struct.pack('>IIBBBBB', width, height, 8, 3, 0, 0, 0)
-    rows = b''.join(b'\0' + bytes(row.tolist()) for row in indices)
-    colours = b''.join(bytes(colour) for colour in palette)
-    path.write_bytes(
-        b'\x89PNG\r\n\x1a\n'
-        + chunk(b'IHDR', header)
-        + chunk(b'PLTE', colours)
-        + chunk(b'IDAT', zlib.compress(rows))
-        + chunk(b'IEND', b'')
-    )
-
-
-def test_palette_pngs_give_their_indices_not_their_colours(tmp_path: Path) -> None:
-    indices = np.array([[0, 1, 2], [2, 1, 0]], np.uint8)
-    palette = [(0, 0, 0), (128, 0, 0), (0, 128, 0)] + [(0, 0, 0)] * 4
-    write_palette_png(tmp_path / 'a.png', indices, palette)
-    assert read_indices(tmp_path / 'a.png').tolist() == indices.tolist()
-    write_palette_png(tmp_path / 'b.png', indices, [(9, 9, 9), (1, 2, 3), (9, 9, 9)])
-    with pytest.raises(SampleError, match='same colour twice'):
-        read_indices(tmp_path / 'b.png')
-
-
-def test_grey_saved_as_colour_still_holds_indices_and_colours_do_not(tmp_path: Path) -> None:
-    grey = np.repeat(np.array([[3, 7]], np.uint8)[..., None], 3, axis=2)
-    cv2.imwrite(str(tmp_path / 'grey.png'), grey)
-    assert read_indices(tmp_path / 'grey.png').tolist() == [[3, 7]]
-    grey[0, 0, 0] = 200
-    cv2.imwrite(str(tmp_path / 'colour.png'), grey)
-    with pytest.raises(SampleError, match='a colour image where class indices are due'):
-        read_indices(tmp_path / 'colour.png')
-    cv2.imwrite(str(tmp_path / 'one.png'), np.zeros((2, 2), np.uint8))
-    with pytest.raises(SampleError, match='where a colour image is due'):
-        read_colours(tmp_path / 'one.png')
-
-
-def test_unreadable_files_are_named(tmp_path: Path) -> None:
-    (tmp_path / 'text.png').write_text('no image')
-    (tmp_path / 'empty.png').write_bytes(b'')
-    _, jpeg = cv2.imencode('.jpg', np.zeros((64, 64, 3), np.uint8))
-    (tmp_path / 'short.jpg').write_bytes(jpeg.tobytes()[:-20])
-    for name, complaint in (
-        ('text.png', 'no readable image'),
-        ('empty.png', 'holds 0 bytes'),
-        ('short.jpg', 'without its end'),
-        ('missing.png', 'No such file'),
-    ):
-        with pytest.raises(SampleError, match=f'{name}.*{complaint}'):
-            read_image(tmp_path / name)

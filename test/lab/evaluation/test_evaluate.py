@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 import shutil
 import sys
 from collections.abc import Callable
@@ -27,6 +28,7 @@ from peace_ros.lab.evaluation.segmentation.errors import DatasetError
 from peace_ros.lab.evaluation.segmentation.figures import figures_of, together
 from peace_ros.lab.evaluation.segmentation.html import write_report
 from peace_ros.lab.evaluation.segmentation.inputs import EvaluationInputs, open_source
+from peace_ros.lab.evaluation.segmentation.pictures import PANELS
 from peace_ros.lab.evaluation.segmentation.run import Outcome, evaluate
 from peace_ros.lab.evaluation.segmentation.threshold import (
     RiskBudget,
@@ -123,7 +125,7 @@ def test_what_cannot_be_scored_is_named_and_not_scored(
     assert 'label value 41 (128 px)' in reasons['value.png']
     assert 'nothing to score' in reasons['blank.png']
     assert 'no label' in reasons['alone.png']
-    assert 'no readable image' in reasons['torn.png']
+    assert 'holds 4 bytes' in reasons['torn.png']
     assert reasons['orphan.png'] == 'a label without an image'
     figures = figures_of(green_cores, outcome.tallies['green'], outcome)
     assert len(figures['skipped']) == 6
@@ -192,11 +194,27 @@ def test_the_report_stands_by_itself(
     named = {'green': figures_of(green_cores, outcome.tallies['green'], outcome)}
     page = write_report(tmp_path / 'out', named, outcome, [green_cores], None).read_text()
     assert 'a&lt;b.png' in page
-    assert page.count('data:image/jpeg;base64,') == 1
+    assert page.count('data:image/jpeg;base64,') == len(PANELS)
     assert page.count('<svg') == 3
     assert 'lone.png' in page
-    assert 'src="http' not in page
+    assert not re.search(r'(src|href)="(?!data:|#)', page)
+    assert '<meta name="viewport"' in page
     assert 'configurations' not in together(named, outcome)
+
+
+@pytest.mark.parametrize('missing', ['jinja2', 'matplotlib'])
+def test_a_report_without_its_libraries_is_refused_before_the_work(
+    missing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = 'peace_ros.lab.evaluation.segmentation'
+    for module in (f'{package}.html', f'{package}.charts'):
+        monkeypatch.delitem(sys.modules, module, raising=False)
+    monkeypatch.setitem(sys.modules, missing, None)
+    options = ['evaluate', '--drawn', '1', '--html', str(tmp_path)]
+    result = CliRunner().invoke(app, options)
+    assert result.exit_code == 2
+    assert f'needs {missing}: run pip install jinja2 matplotlib' in result.output
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_command_writes_figures_with_intervals(tmp_path: Path) -> None:

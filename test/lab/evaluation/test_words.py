@@ -16,6 +16,7 @@ from peace_ros.cli.main import app
 from peace_ros.core.domain import ConfigurationError, Frame
 from peace_ros.lab.evaluation.words import CONDITIONS, load_frames, measure
 from peace_ros.simulation.drawing import draw_scene
+from peace_ros.simulation.rasters import RasterError
 
 
 class _Reader:
@@ -64,5 +65,5 @@ def test_a_folder_without_images_is_refused(tmp_path: Path) -> None:
 
 def test_an_unreadable_image_is_named(tmp_path: Path) -> None:
     (tmp_path / 'broken.jpg').write_bytes(b'no image')
-    with pytest.raises(ConfigurationError, match=r'broken\.jpg'):
+    with pytest.raises(RasterError, match=r'broken\.jpg'):
         load_frames(tmp_path)

@@ -110,6 +110,7 @@ class SharedEncoder:
 
     def __init__(self, encoder: Encoder) -> None:
         self._encoder = encoder
+        self.text_embeddings = encoder.text_embeddings
         self._frame: Frame | None = None
         self._embedding: NDArray[np.float32] | None = None
 
@@ -119,21 +120,14 @@ class SharedEncoder:
             self._frame, self._embedding = frame, self._encoder.image_embedding(frame)
         return self._embedding
 
-    def text_embeddings(self, texts: Sequence[str]) -> NDArray[np.float32]:
-        """Return (T, D) float32 of unit length."""
-        return self._encoder.text_embeddings(texts)
-
 
 class OppositeEncoder:
     """Turns images about, so that the words that fit least come first."""
 
     def __init__(self, encoder: Encoder) -> None:
         self._encoder = encoder
+        self.text_embeddings = encoder.text_embeddings
 
     def image_embedding(self, frame: Frame) -> NDArray[np.float32]:
         """Return (D,) float32 of unit length, opposite to the image's."""
         return -self._encoder.image_embedding(frame)
-
-    def text_embeddings(self, texts: Sequence[str]) -> NDArray[np.float32]:
-        """Return (T, D) float32 of unit length."""
-        return self._encoder.text_embeddings(texts)

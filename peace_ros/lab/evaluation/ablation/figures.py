@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,13 @@ from numpy.typing import NDArray
 from peace_ros.core.domain import Label
 from peace_ros.lab.evaluation.ablation.run import Counted, Key
 from peace_ros.lab.evaluation.ablation.variants import DEFAULT, VOCABULARY
-from peace_ros.lab.evaluation.segmentation.bootstrap import Bootstrap
+from peace_ros.lab.evaluation.segmentation.bootstrap import Bootstrap, known
 from peace_ros.lab.evaluation.segmentation.cores import Cores
 from peace_ros.lab.evaluation.segmentation.histograms import BINS, MIDDLE, edges
 from peace_ros.lab.evaluation.segmentation.metrics import (
     Areas,
     average_precision,
+    best_bin,
     share_called_safe,
 )
 
@@ -40,9 +42,7 @@ def ablation_figures(counted: Counted, cores: Cores) -> Figures:
     base = _best(counted.counts[default], bootstrap)
     rows = [
         {
-            'group': key[0],
-            'variant': key[1],
-            'fusion': key[2],
+            **dict(zip(('group', 'variant', 'fusion'), key, strict=True)),
             'is_default': key == default,
             **_row(counts, base, bootstrap),
         }
@@ -56,19 +56,14 @@ def ablation_figures(counted: Counted, cores: Cores) -> Figures:
         'fusion': fusion,
         'variants': rows,
         'thresholds': _thresholds(counted.counts[default], cores),
-        'skipped': [{'name': each.name, 'reason': each.reason} for each in counted.skipped],
+        'skipped': [asdict(each) for each in counted.skipped],
     }
-
-
-def _best_bin(total: NDArray[np.float64]) -> int:
-    curve = np.nan_to_num(Areas(total, None).miou, nan=-1.0)
-    return int(curve[1:].argmax()) + 1
 
 
 def _best(counts: NDArray[np.uint32], bootstrap: Bootstrap) -> tuple[float, NDArray[np.float64]]:
     """Return the mIoU at the threshold that is best on all frames, and [replicates] of it."""
     total = counts.sum(0, dtype=np.float64)
-    best = _best_bin(total)
+    best = best_bin(Areas(total, None).miou)
     return float(Areas(total, best).miou), Areas(bootstrap.sums(counts), best).miou
 
 
@@ -83,15 +78,15 @@ def _row(
     at_recall = every.false_safe[enough[-1]] if enough.size and enough[-1] > 0 else np.nan
     shipped = Areas(total, MIDDLE)
     return {
-        'best_miou': _number(best),
-        'best_miou_interval': _pair(bootstrap.interval(drawn)),
-        'difference': _number(best - base[0]),
-        'difference_interval': _pair(bootstrap.interval(drawn - base[1])),
-        'average_precision': _number(average_precision(total)),
-        'false_safe_at_recall': _number(at_recall),
-        'miou': _number(shipped.miou),
-        'false_safe': _number(shipped.false_safe),
-        'recall': _number(shipped.recall),
+        'best_miou': known(best),
+        'best_miou_interval': bootstrap.interval(drawn),
+        'difference': known(best - base[0]),
+        'difference_interval': bootstrap.interval(drawn - base[1]),
+        'average_precision': known(average_precision(total)),
+        'false_safe_at_recall': known(at_recall),
+        'miou': known(shipped.miou),
+        'false_safe': known(shipped.false_safe),
+        'recall': known(shipped.recall),
     }
 
 
@@ -110,18 +105,10 @@ def _thresholds(counts: NDArray[np.uint32], cores: Cores) -> list[Figures]:
                 {
                     'threshold': round(own, 4),
                     'is_default': place == MIDDLE,
-                    'miou': _number(every.miou[place]),
-                    'false_safe': _number(every.false_safe[place]),
-                    'recall': _number(every.recall[place]),
-                    'person': _number(share_called_safe(total, Label.PERSON, place)),
+                    'miou': known(every.miou[place]),
+                    'false_safe': known(every.false_safe[place]),
+                    'recall': known(every.recall[place]),
+                    'person': known(share_called_safe(total, Label.PERSON, place)),
                 }
             )
     return rows
-
-
-def _number(value: Any) -> float | None:
-    return round(float(value), 5) if np.isfinite(value) else None
-
-
-def _pair(limits: tuple[float, float] | None) -> list[float] | None:
-    return None if limits is None else [round(limits[0], 5), round(limits[1], 5)]

@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,13 +23,14 @@ from peace_ros.lab.evaluation.ablation.features import (
 )
 from peace_ros.lab.evaluation.ablation.variants import Variant
 from peace_ros.lab.evaluation.segmentation.cores import Cores
-from peace_ros.lab.evaluation.segmentation.errors import DatasetError, SampleError
 from peace_ros.lab.evaluation.segmentation.histograms import BINS, LABELS, count_labels
-from peace_ros.lab.evaluation.segmentation.samples import Pair, SampleSource, Skipped
-from peace_ros.lab.evaluation.segmentation.tiles import tiles_of
+from peace_ros.lab.evaluation.segmentation.run import Watch, cut, fitted, readable
+from peace_ros.lab.evaluation.segmentation.samples import SampleSource, Skipped
 
 Key = tuple[str, str, str]
 """Group and name of a variant, and fusion."""
+Counts = NDArray[np.uint32]
+"""[LABELS, BINS]."""
 
 
 @dataclass(frozen=True)
@@ -57,57 +58,41 @@ class _Bench:
         self.segmenter = FeatureSegmenter(
             cores.bundle, cores.segmenter.terms, threads, cores.segmentation.clipseg_max_looks
         )
-        clip = ClipEncoder(Bundle.load(cores.prompting.bundle), threads=threads)
-        self._encoder = SharedEncoder(clip)
-        opposite = OppositeEncoder(self._encoder)
+        encoder = SharedEncoder(ClipEncoder(Bundle.load(cores.prompting.bundle), threads=threads))
+        opposite = OppositeEncoder(encoder)
         vocabularies = load_vocabularies(cores.prompting.vocabularies)
-        self.generators = [
-            (
-                variant,
-                PromptGenerator(
-                    opposite if variant.fits_least else self._encoder,
-                    vocabularies,
-                    replace(
-                        cores.prompting,
-                        template=variant.template,
-                        environment_words=variant.environment_words,
-                    ),
-                ),
+        self._generators: list[tuple[Variant, PromptGenerator]] = []
+        for variant in variants:
+            parameters = replace(
+                cores.prompting,
+                template=variant.template,
+                environment_words=variant.environment_words,
             )
-            for variant in variants
-        ]
+            ranking = opposite if variant.fits_least else encoder
+            generator = PromptGenerator(ranking, vocabularies, parameters)
+            self._generators.append((variant, generator))
         # The bundle's threshold was measured with the set difference, and holds only there.
         recommended = float(cores.bundle.manifest.recommended.get('threshold', 0.5))
         self._standing = dict.fromkeys(FUSIONS, 0.5) | {'set_difference': recommended}
 
-    def look(self, frame: Frame, labels: NDArray[np.uint8]) -> dict[Key, NDArray[np.uint32]]:
-        """Return the counts of every variant and fusion on one image."""
+    def look(self, frame: Frame, labels: NDArray[np.uint8]) -> Iterator[tuple[Key, Counts]]:
+        """Yield the counts of every variant and fusion on one image."""
         features = self.segmenter.encode(frame)
-        height, width = labels.shape
-        found = {}
-        by_template: dict[str, dict[str, NDArray[np.uint32]]] = {}
-        for variant, generator in self.generators:
+        by_template: dict[str, dict[str, Counts]] = {}
+        for variant, generator in self._generators:
             generator.reset()
             prompt = generator.generate(frame)
             # Variants often come to the same prompt; it is decoded once.
             if prompt.template not in by_template:
                 scores = self.segmenter.scores(features, prompt, tuple(FUSIONS))
                 by_template[prompt.template] = {
-                    name: count_labels(labels, self._sized(name, each, width, height))
+                    name: count_labels(
+                        labels, fitted(calibrated(each, self._standing[name]), labels.shape)
+                    )
                     for name, each in scores.items()
                 }
             for name, counts in by_template[prompt.template].items():
-                found[variant.group, variant.name, name] = counts
-        return found
-
-    def _sized(
-        self, fusion: str, scores: NDArray[np.float32], width: int, height: int
-    ) -> NDArray[np.float32]:
-        safety = calibrated(scores, self._standing[fusion])
-        if safety.shape == (height, width):
-            return safety
-        resized = cv2.resize(safety, (width, height), interpolation=cv2.INTER_LINEAR)
-        return np.asarray(resized, np.float32)
+                yield (variant.group, variant.name, name), counts
 
 
 def ablate(
@@ -117,7 +102,7 @@ def ablate(
     *,
     tile_px: int | None = None,
     strict: bool = False,
-    report: Callable[[int], None] | None = None,
+    watch: Watch = iter,
 ) -> Counted:
     """Run every variant, with every fusion, over every image of a source.
 
@@ -126,45 +111,25 @@ def ablate(
         cores: of the family clipseg; its terms, bundles and vocabularies are used.
         variants: ways to write prompts.
         tile_px: see :func:`tiles_of`; None also takes what the source suggests.
-        strict: refuse the first image that cannot be scored instead of skipping it.
-        report: is called with the number of images that are done.
+        strict: see :func:`readable`.
+        watch: shows how far it is.
 
     Raises:
-        DatasetError: nothing could be scored, or ``strict`` and something could not.
+        DatasetError: see :func:`readable`.
         ConfigurationError: the configuration is of another family.
     """
     bench = _Bench(cores, variants)
     tile_px = source.tile_px if tile_px is None else tile_px
-    skipped = list(source.skipped)
-    if strict and skipped:
-        raise DatasetError(f'{skipped[0].name}: {skipped[0].reason} (--strict)')
+    skipped: list[Skipped] = []
     names: list[str] = []
-    counts: dict[Key, list[NDArray[np.uint32]]] = {}
-    for done, sample in enumerate(source.samples, start=1):
-        try:
-            pair = sample.load()
-        except SampleError as error:
-            if strict:
-                raise DatasetError(f'{sample.name}: {error} (--strict)') from error
-            skipped.append(Skipped(sample.name, str(error)))
-        else:
-            names.append(sample.name)
-            for key, each in _frame_counts(bench, pair, tile_px).items():
-                counts.setdefault(key, []).append(each)
-        if report is not None:
-            report(done)
-    if not names:
-        raise DatasetError(f'{source.title}: no image could be scored')
+    counts: dict[Key, list[Counts]] = defaultdict(list)
+    for name, (image, labels) in readable(source, skipped, strict=strict, watch=watch):
+        names.append(name)
+        sums: dict[Key, Counts] = defaultdict(lambda: np.zeros((LABELS, BINS), np.uint32))
+        for tile, frame in cut(image, tile_px):
+            for key, each in bench.look(frame, tile.labels_of(labels)):
+                sums[key] += each
+        for key, each in sums.items():
+            counts[key].append(each)
     stacked = {key: np.stack(each) for key, each in counts.items()}
     return Counted(stacked, tuple(names), tuple(skipped), bench.segmenter.encodings)
-
-
-def _frame_counts(bench: _Bench, pair: Pair, tile_px: int | None) -> dict[Key, NDArray[np.uint32]]:
-    image, labels = pair
-    height_px, width_px = labels.shape
-    sums: dict[Key, NDArray[np.uint32]] = {}
-    for tile in tiles_of(height_px, width_px, tile_px):
-        frame = Frame(np.ascontiguousarray(image[tile.rows, tile.columns]), 0)
-        for key, counts in bench.look(frame, tile.labels_of(labels)).items():
-            sums[key] = sums.get(key, np.zeros((LABELS, BINS), np.uint32)) + counts
-    return sums

@@ -1,8 +1,10 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Intervals over frames: pixels of one frame are alike, so whole frames are drawn again."""
+"""Figures and their intervals: pixels of one frame are alike, so whole frames are drawn again."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +32,7 @@ class Bootstrap:
             out += self._weights[:, part] @ flat[part].astype(np.float64)
         return out.reshape(len(self._weights), *per_frame.shape[1:])
 
-    def interval(self, values: NDArray[np.float64]) -> tuple[float, float] | None:
+    def interval(self, values: NDArray[np.float64]) -> list[float] | None:
         """Return the limits of the middle LEVEL of [replicates]; None for fewer than two frames.
 
         Draws without a value (a rate of nothing) are left out.
@@ -39,5 +41,14 @@ class Bootstrap:
         if self._frames < 2 or not values.size:
             return None
         tail = (1.0 - LEVEL) / 2.0
-        low, high = np.quantile(values, [tail, 1.0 - tail])
-        return float(low), float(high)
+        return [rounded(each) for each in np.quantile(values, [tail, 1.0 - tail])]
+
+
+def rounded(value: float | np.floating[Any] | NDArray[np.float64]) -> float:
+    """Return a figure as it is written."""
+    return round(float(value), 5)
+
+
+def known(value: float | np.floating[Any] | NDArray[np.float64]) -> float | None:
+    """Return a figure as it is written, None when it is not a number."""
+    return rounded(value) if np.isfinite(value) else None

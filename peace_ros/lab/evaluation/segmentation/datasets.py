@@ -16,7 +16,6 @@ from peace_ros.lab.evaluation.segmentation.classes import (
     whole_number,
 )
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError
-from peace_ros.lab.evaluation.segmentation.rasters import IMAGE_SUFFIXES
 from peace_ros.lab.evaluation.segmentation.samples import (
     FileSample,
     Sample,
@@ -24,6 +23,7 @@ from peace_ros.lab.evaluation.segmentation.samples import (
     Skipped,
     mixed_remark,
 )
+from peace_ros.simulation.rasters import IMAGE_SUFFIXES
 
 
 def dataset_source(name: str, root: Path, split: str, mixed: str) -> SampleSource:

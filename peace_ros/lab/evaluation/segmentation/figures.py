@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from peace_ros.lab.evaluation.segmentation.bootstrap import Bootstrap
+from peace_ros.lab.evaluation.segmentation.bootstrap import Bootstrap, known, rounded
 from peace_ros.lab.evaluation.segmentation.cores import Cores
 from peace_ros.lab.evaluation.segmentation.histograms import BINS, bin_from, edges
 from peace_ros.lab.evaluation.segmentation.metrics import (
@@ -16,6 +17,7 @@ from peace_ros.lab.evaluation.segmentation.metrics import (
     Areas,
     Array,
     average_precision,
+    best_bin,
     calibration_error,
     ratio,
     reliability,
@@ -62,41 +64,34 @@ def figures_of(
         'configuration': cores.name,
         'frames': tally.frames,
         'tiles': int(sum(tally.tiles)),
-        'threshold': _rounded(cores.own_score(float(edges()[at]))),
+        'threshold': rounded(cores.own_score(float(edges()[at]))),
     }
+
+    def put(name: str, value: Array, drawn_values: Array) -> None:
+        figures[name] = known(value)
+        figures[f'{name}_interval'] = bootstrap.interval(drawn_values)
 
     areas, drawn_areas = Areas(total, at), Areas(drawn, at)
     for name in _AREA_RATES:
-        values = getattr(areas, name), getattr(drawn_areas, name)
-        figures |= _with_interval(name, *values, bootstrap)
-    for name, rate in (('ece', calibration_error), ('average_precision', average_precision)):
-        figures |= _with_interval(name, rate(total), rate(drawn), bootstrap)
-    figures |= _hazard_figures(total, drawn, at, bootstrap)
+        put(name, getattr(areas, name), getattr(drawn_areas, name))
+    put('ece', calibration_error(total), calibration_error(drawn))
+    put('average_precision', average_precision(total), average_precision(drawn))
+    speed = np.stack([np.array(tally.tiles, float), np.array(tally.seconds)], axis=1)
+    put('hz', ratio(*speed.sum(0)), ratio(*bootstrap.sums(speed).T))
+    figures['false_safe_by_hazard'] = {
+        name: known(share_called_safe(total, label, at)) for name, label in HAZARDS.items()
+    }
+    figures['false_safe_by_hazard_interval'] = {
+        name: bootstrap.interval(share_called_safe(drawn, label, at))
+        for name, label in HAZARDS.items()
+    }
     figures |= _term_figures(tally, bootstrap)
-    figures |= _speed(tally, bootstrap)
     figures['curve'] = _curve(cores, total)
     figures['reliability'] = _reliability(total)
     figures['model'] = _model(cores)
-    figures['prompts'] = dict(sorted(tally.prompts.items(), key=lambda item: -item[1])[:10])
+    figures['prompts'] = dict(tally.prompts.most_common(10))
     figures['per_frame'] = _per_frame(tally, at)
-    figures['skipped'] = [{'name': each.name, 'reason': each.reason} for each in outcome.skipped]
-    return figures
-
-
-def _with_interval(name: str, value: Array, drawn: Array, bootstrap: Bootstrap) -> Figures:
-    return {
-        name: _number(float(value)),
-        f'{name}_interval': _pair(bootstrap.interval(drawn)),
-    }
-
-
-def _hazard_figures(total: Array, drawn: Array, at: int, bootstrap: Bootstrap) -> Figures:
-    key = 'false_safe_by_hazard'
-    figures: Figures = {key: {}, f'{key}_interval': {}}
-    for name, label in HAZARDS.items():
-        figures[key][name] = _number(float(share_called_safe(total, label, at)))
-        limits = bootstrap.interval(share_called_safe(drawn, label, at))
-        figures[f'{key}_interval'][name] = _pair(limits)
+    figures['skipped'] = [asdict(each) for each in outcome.skipped]
     return figures
 
 
@@ -111,43 +106,33 @@ def _term_figures(tally: Tally, bootstrap: Bootstrap) -> Figures:
         'unscored_terms': list(tally.unscored_terms),
     }  # fmt: skip
     counts = np.stack(tally.term_counts)
-    if not counts.any():
-        return figures
-    for place, term in enumerate(tally.terms):
+    for place, term in enumerate(tally.terms if counts.any() else ()):
         each = counts[:, place]
         total = each.sum(0, dtype=np.float64)
-        curve = np.nan_to_num(term_iou(total), nan=-1.0)
-        best = int(curve[1:].argmax()) + 1
-        known = total[1].sum() > 0
-        figures['iou_by_term'][term] = _number(float(curve[best])) if known else None
+        best = best_bin(term_iou(total))
         drawn = bootstrap.sums(np.stack([each[..., best:].sum(-1), each[..., :best].sum(-1)], -1))
         called, missed, wrong = drawn[:, 1, 0], drawn[:, 1, 1], drawn[:, 0, 0]
-        limits = bootstrap.interval(ratio(called, called + missed + wrong)) if known else None
-        figures['iou_by_term_interval'][term] = _pair(limits)
-        figures['term_threshold'][term] = _rounded(float(edges()[best])) if known else None
+        limits = bootstrap.interval(ratio(called, called + missed + wrong))
+        there = total[1].sum() > 0
+        figures['iou_by_term'][term] = known(term_iou(total)[best]) if there else None
+        figures['iou_by_term_interval'][term] = limits if there else None
+        figures['term_threshold'][term] = rounded(edges()[best]) if there else None
     return figures
-
-
-def _speed(tally: Tally, bootstrap: Bootstrap) -> Figures:
-    pairs = np.stack([np.array(tally.tiles, float), np.array(tally.seconds)], axis=1)
-    drawn = bootstrap.sums(pairs)
-    tiles, seconds = pairs.sum(0)
-    return {
-        'hz': _number(float(ratio(tiles, seconds))),
-        'hz_interval': _pair(bootstrap.interval(ratio(drawn[:, 0], drawn[:, 1]))),
-    }
 
 
 def _curve(cores: Cores, total: Array) -> list[Figures]:
     areas = Areas(total, None)
+    rates = {
+        'recall': areas.recall,
+        'precision': 1.0 - areas.false_safe,
+        'false_safe': areas.false_safe,
+        'miou': areas.miou,
+        'called_safe': areas.called_safe,
+    }
     return [
         {
-            'threshold': _rounded(cores.own_score(float(edges()[place]))),
-            'recall': _number(float(areas.recall[place])),
-            'precision': _number(float(1.0 - areas.false_safe[place])),
-            'false_safe': _number(float(areas.false_safe[place])),
-            'miou': _number(float(areas.miou[place])),
-            'called_safe': _number(float(areas.called_safe[place])),
+            'threshold': rounded(cores.own_score(float(edges()[place]))),
+            **{name: known(rate[place]) for name, rate in rates.items()},
         }
         for place in range(_CURVE_EVERY, BINS, _CURVE_EVERY)
     ]
@@ -155,13 +140,10 @@ def _curve(cores: Cores, total: Array) -> list[Figures]:
 
 def _reliability(total: Array) -> list[Figures]:
     scores, shares, pixels = reliability(total)
+    parts = pixels / max(1.0, pixels.sum())
     return [
-        {
-            'score': _number(float(score)),
-            'safe': _number(float(share)),
-            'share_of_pixels': _number(float(part / max(1.0, pixels.sum()))),
-        }
-        for score, share, part in zip(scores, shares, pixels, strict=True)
+        {'score': known(score), 'safe': known(share), 'share_of_pixels': known(part)}
+        for score, share, part in zip(scores, shares, parts, strict=True)
     ]
 
 
@@ -187,24 +169,12 @@ def _per_frame(tally: Tally, at: int) -> list[Figures]:
     return [
         {
             'name': name,
-            'miou': _number(float(areas.miou[place])),
-            'recall': _number(float(areas.recall[place])),
-            'unsafe_called_safe_area': _number(float(wrong[place])),
+            'miou': known(areas.miou[place]),
+            'recall': known(areas.recall[place]),
+            'unsafe_called_safe_area': known(wrong[place]),
         }
         for place, name in enumerate(tally.names)
     ]
-
-
-def _number(value: float) -> float | None:
-    return _rounded(value) if np.isfinite(value) else None
-
-
-def _rounded(value: float) -> float:
-    return round(value, 5)
-
-
-def _pair(limits: tuple[float, float] | None) -> list[float] | None:
-    return None if limits is None else [_rounded(limits[0]), _rounded(limits[1])]
 
 
 def together(named: dict[str, Figures], outcome: Outcome) -> Figures:

@@ -6,8 +6,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from peace_ros.lab.evaluation.segmentation.classes import MIXED
+from typer import Option
+
+from peace_ros.lab.evaluation.segmentation.classes import MIXED, dataset_names
 from peace_ros.lab.evaluation.segmentation.datasets import dataset_source
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError
 from peace_ros.lab.evaluation.segmentation.samples import (
@@ -20,23 +23,42 @@ from peace_ros.lab.evaluation.segmentation.samples import (
     sampled,
 )
 
+_DATASET = f'One of {", ".join(dataset_names())}; needs --root.'
+_MIXED = f'Classes of safe and unsafe ground alike: {", ".join(MIXED)}.'
+
 
 @dataclass(frozen=True)
 class EvaluationInputs:
     """Options of ``peace evaluate`` and ``peace ablate`` that name images."""
 
-    dataset: str = ''
-    root: Path | None = None
-    images: Path | None = None
-    labels: Path | None = None
-    manifest: Path | None = None
-    drawn: int = 0
-    drawn_seed: int | None = None
-    drawn_px: int = CAMERA_PX
-    classes: str = 'common'
-    split: str = ''
-    mixed: str = 'ignore'
-    limit: int | None = None
+    dataset: Annotated[str, Option(metavar='NAME', help=_DATASET)] = ''
+    root: Annotated[Path | None, Option(metavar='DIR', help='Where the dataset was unpacked.')] = (
+        None
+    )
+    images: Annotated[
+        Path | None, Option(metavar='DIR', help='Folder of images; needs --labels.')
+    ] = None
+    labels: Annotated[
+        Path | None, Option(metavar='DIR', help='Folder of label PNGs, same stems.')
+    ] = None
+    manifest: Annotated[
+        Path | None, Option(metavar='FILE', help='CSV with columns image, label, split.')
+    ] = None
+    drawn: Annotated[int, Option(metavar='N', min=0, help='Draw N scenes.')] = 0
+    drawn_seed: Annotated[
+        int | None, Option(metavar='SEED', min=0, help='First seed of the drawn scenes.')
+    ] = None
+    drawn_px: Annotated[
+        int, Option(metavar='N', min=64, max=4096, help='Side of the camera that sees the scenes.')
+    ] = CAMERA_PX
+    classes: Annotated[
+        str, Option(metavar='NAME|FILE', help='Class table of --labels and --manifest.')
+    ] = 'common'
+    split: Annotated[str, Option(help='Only this split of the dataset or manifest.')] = ''
+    mixed: Annotated[str, Option(help=_MIXED)] = 'ignore'
+    limit: Annotated[
+        int | None, Option(metavar='N', min=1, help='At most N images, evenly spread.')
+    ] = None
 
 
 def open_source(inputs: EvaluationInputs) -> SampleSource:

@@ -108,6 +108,11 @@ def _split(counts: Array, threshold_bin: int | None) -> tuple[Array, Array]:
     return called[..., threshold_bin], missed[..., threshold_bin]
 
 
+def best_bin(rates: Array) -> int:
+    """Return the threshold, 1 to BINS - 1, at which a rate, [BINS], is highest."""
+    return int(np.nan_to_num(rates, nan=-1.0)[1:].argmax()) + 1
+
+
 def share_called_safe(counts: NDArray[np.generic], label: Label, threshold_bin: int) -> Array:
     """Return the share of a label's pixels that is called safe."""
     of_label = np.asarray(counts, np.float64)[..., int(label), :]

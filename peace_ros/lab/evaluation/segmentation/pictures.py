@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a configuration did on one image, as a strip: image, truth, heatmap, called safe."""
+"""What a configuration did on one image: image, truth, heatmap, called safe."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import Frame, Heatmap, Label
+from peace_ros.core.images import jpeg_from_rgb
 from peace_ros.core.segmentation import draw_overlay
 from peace_ros.lab.evaluation.segmentation.cores import Cores
 from peace_ros.lab.evaluation.segmentation.run import looks
@@ -31,12 +32,11 @@ LABEL_COLOURS: dict[Label, tuple[int, int, int]] = {
 }
 _PALETTE = np.array([LABEL_COLOURS[label] for label in Label], np.uint8)
 _PANEL_PX = 320
-_GAP_PX = 6
 _QUALITY = 80
 
 
-def strip(pair: Pair, cores: Cores, tile_px: int | None, score: float) -> str:
-    """Return a JPEG strip as a data URI.
+def panels(pair: Pair, cores: Cores, tile_px: int | None, score: float) -> list[str]:
+    """Return PANELS as JPEG data URIs.
 
     Args:
         pair: image and labels.
@@ -52,15 +52,13 @@ def strip(pair: Pair, cores: Cores, tile_px: int | None, score: float) -> str:
     small = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
     levels = np.rint(safety * 255.0).astype(np.uint8)
     coloured = cv2.cvtColor(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS), cv2.COLOR_BGR2RGB)
-    panels = [
+    drawn = (
         small,
         _PALETTE[nearest(labels, *size)],
         np.asarray(coloured, np.uint8),
         draw_overlay(Frame(small, 0), Heatmap(safety, 0), score),
-    ]
-    gap = np.full((size[1], _GAP_PX, 3), 255, np.uint8)
-    row = np.hstack([each for panel in panels for each in (panel, gap)][:-1])
-    return _data_uri(row)
+    )
+    return [_data_uri(each) for each in drawn]
 
 
 def _safety(
@@ -91,6 +89,5 @@ def _safety(
 
 
 def _data_uri(picture: NDArray[np.uint8]) -> str:
-    bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
-    _, encoded = cv2.imencode('.jpg', bgr, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    return 'data:image/jpeg;base64,' + base64.b64encode(encoded.tobytes()).decode('ascii')
+    encoded = base64.b64encode(jpeg_from_rgb(picture, _QUALITY)).decode('ascii')
+    return f'data:image/jpeg;base64,{encoded}'

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -26,6 +27,9 @@ from peace_ros.lab.evaluation.segmentation.samples import (
 from peace_ros.lab.evaluation.segmentation.term_labels import load_term_labels, meanings_of
 from peace_ros.lab.evaluation.segmentation.tiles import Tile, tiles_of
 
+Watch = Callable[[Sequence[Sample]], Iterable[Sample]]
+"""Hands samples on one by one, and may show how far it is."""
+
 
 @dataclass
 class Tally:
@@ -45,7 +49,7 @@ class Tally:
     """Per frame how many images the networks saw."""
     seconds: list[float] = field(default_factory=list)
     """Per frame the time of its prompts and heatmaps."""
-    prompts: dict[str, int] = field(default_factory=dict)
+    prompts: Counter[str] = field(default_factory=Counter)
     """Prompt template -> how often it was chosen."""
 
     @classmethod
@@ -84,21 +88,68 @@ class TileLook:
     seconds: float
 
 
+def readable(
+    source: SampleSource, skipped: list[Skipped], *, strict: bool = False, watch: Watch = iter
+) -> Iterator[tuple[str, Pair]]:
+    """Yield name, image and labels of each sample; those that cannot be scored are skipped.
+
+    Args:
+        source: labelled images.
+        skipped: gets what is not scored.
+        strict: refuse the first sample that cannot be scored instead of skipping it.
+        watch: shows how far it is.
+
+    Raises:
+        DatasetError: nothing could be scored, or ``strict`` and something could not.
+    """
+    count = 0
+    skipped += source.skipped
+    for sample in watch(source.samples if not (strict and skipped) else ()):
+        pair = _loaded(sample)
+        if isinstance(pair, Skipped):
+            skipped.append(pair)
+            if strict:
+                break
+        else:
+            count += 1
+            yield sample.name, pair
+    first = f'{skipped[0].name}: {skipped[0].reason}' if skipped else ''
+    if strict and skipped:
+        raise DatasetError(f'{first} (--strict)')
+    if not count:
+        reason = f'; the first of {len(skipped)}: {first}' if skipped else ''
+        raise DatasetError(f'{source.title}: no image could be scored{reason}')
+
+
+def _loaded(sample: Sample) -> Pair | Skipped:
+    try:
+        return sample.load()
+    except SampleError as error:
+        return Skipped(sample.name, str(error))
+
+
+def cut(image_rgb: NDArray[np.uint8], tile_px: int | None) -> Iterator[tuple[Tile, Frame]]:
+    """Yield the tiles of an image, see :func:`tiles_of`, as frames."""
+    for tile in tiles_of(image_rgb.shape[0], image_rgb.shape[1], tile_px):
+        yield tile, Frame(np.ascontiguousarray(image_rgb[tile.rows, tile.columns]), 0)
+
+
+def fitted(safety: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Return a heatmap at the size (height, width, ...) of an image."""
+    if safety.shape == shape[:2]:
+        return safety
+    resized = cv2.resize(safety, (shape[1], shape[0]), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(resized, np.float32)
+
+
 def looks(image_rgb: NDArray[np.uint8], cores: Cores, tile_px: int | None) -> Iterator[TileLook]:
     """Yield what a configuration makes of each tile of an image."""
-    height_px, width_px = image_rgb.shape[:2]
-    for tile in tiles_of(height_px, width_px, tile_px):
-        frame = Frame(np.ascontiguousarray(image_rgb[tile.rows, tile.columns]), 0)
+    for tile, frame in cut(image_rgb, tile_px):
         start = time.perf_counter()
         prompt = cores.prompt(frame)
-        heatmap = cores.segment(frame, prompt)
+        safety = cores.segment(frame, prompt).safety
         seconds = time.perf_counter() - start
-        height, width = frame.image_rgb.shape[:2]
-        safety = heatmap.safety
-        if safety.shape != (height, width):
-            safety = np.asarray(
-                cv2.resize(safety, (width, height), interpolation=cv2.INTER_LINEAR), np.float32
-            )
+        safety = fitted(safety, frame.image_rgb.shape)
         yield TileLook(tile, safety, frame, prompt.template, seconds)
 
 
@@ -109,7 +160,7 @@ def evaluate(
     tile_px: int | None = None,
     strict: bool = False,
     score_terms: bool = True,
-    report: Callable[[int], None] | None = None,
+    watch: Watch = iter,
 ) -> Outcome:
     """Run every configuration over every image of a source.
 
@@ -117,39 +168,20 @@ def evaluate(
         source: labelled images.
         configurations: at least one.
         tile_px: see :func:`tiles_of`; None also takes what the source suggests.
-        strict: refuse the first image that cannot be scored instead of skipping it.
+        strict: see :func:`readable`.
         score_terms: also score each term by itself; each frame is then encoded twice.
-        report: is called with the number of images that are done.
+        watch: shows how far it is.
 
     Raises:
-        DatasetError: nothing could be scored, or ``strict`` and something could not.
+        DatasetError: see :func:`readable`.
     """
     tile_px = source.tile_px if tile_px is None else tile_px
-    skipped = list(source.skipped)
-    if strict and skipped:
-        raise DatasetError(f'{skipped[0].name}: {skipped[0].reason} (--strict)')
+    skipped: list[Skipped] = []
     tallies = {cores.name: Tally.of(cores) for cores in configurations}
-    for done, sample in enumerate(source.samples, start=1):
-        pair = _load(sample, skipped, strict=strict)
-        if pair is not None:
-            for cores in configurations:
-                _score(sample.name, pair, cores, tile_px, tallies[cores.name], score_terms)
-        if report is not None:
-            report(done)
-    if not any(tally.frames for tally in tallies.values()):
-        reason = f'; the first of {len(skipped)}: {skipped[0].name}: {skipped[0].reason}'
-        raise DatasetError(f'{source.title}: no image could be scored{reason if skipped else ""}')
+    for name, pair in readable(source, skipped, strict=strict, watch=watch):
+        for cores in configurations:
+            _score(name, pair, cores, tile_px, tallies[cores.name], score_terms)
     return Outcome(source, tallies, tuple(skipped))
-
-
-def _load(sample: Sample, skipped: list[Skipped], *, strict: bool) -> Pair | None:
-    try:
-        return sample.load()
-    except SampleError as error:
-        if strict:
-            raise DatasetError(f'{sample.name}: {error} (--strict)') from error
-        skipped.append(Skipped(sample.name, str(error)))
-        return None
 
 
 def _score(
@@ -164,7 +196,7 @@ def _score(
         own = look.tile.labels_of(labels)
         counts += count_labels(own, look.safety)
         seconds, tiles = seconds + look.seconds, tiles + 1
-        tally.prompts[look.template] = tally.prompts.get(look.template, 0) + 1
+        tally.prompts[look.template] += 1
         if score_terms and len(terms):
             maps = cores.segmenter.term_maps(look.frame, cores.prompt(look.frame))
             height, width = maps.shape[1:]

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from peace_ros.core.domain import Label
 from peace_ros.lab.evaluation.segmentation.classes import (
     Converter,
     dataset_names,
@@ -23,13 +24,14 @@ from peace_ros.lab.evaluation.segmentation.classes import (
     whole_number,
 )
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError, SampleError
-from peace_ros.lab.evaluation.segmentation.rasters import (
-    IMAGE_SUFFIXES,
-    read_colours,
-    read_image,
-    read_indices,
-)
 from peace_ros.simulation.drawing import draw_scene
+from peace_ros.simulation.rasters import (
+    IMAGE_SUFFIXES,
+    RasterError,
+    read_colours,
+    read_indices,
+    read_photo,
+)
 
 CAMERA_PX = 1056
 """Side of the drawn views, where that is not finer than FINEST_M."""
@@ -91,15 +93,20 @@ class FileSample:
 
     def load(self) -> Pair:
         """Read both files."""
-        image = read_image(self.image)
-        indices = self.convert.masks == 'indices'
-        raster = read_indices(self.label) if indices else read_colours(self.label)
+        try:
+            image, known = read_photo(self.image)
+            indices = self.convert.masks == 'indices'
+            raster = read_indices(self.label) if indices else read_colours(self.label)
+        except RasterError as error:
+            raise SampleError(str(error)) from error
         if raster.shape[:2] != image.shape[:2]:
             raise SampleError(
                 f'labels of {raster.shape[1]} x {raster.shape[0]} px for an image of '
                 f'{image.shape[1]} x {image.shape[0]} px: both must be of one size'
             )
         labels = self.convert(raster)
+        if known is not None:
+            labels = np.where(known, labels, np.uint8(Label.UNLABELED))
         if not labels.any():
             raise SampleError('no pixel of a class that counts: nothing to score')
         return image, labels

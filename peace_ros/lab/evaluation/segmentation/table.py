@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from rich.table import Table
 
 from peace_ros.lab.evaluation.segmentation.figures import Figures
@@ -33,50 +31,55 @@ def percent(value: float | None) -> str:
     return '-' if value is None else f'{100.0 * value:.1f}'
 
 
-def with_interval(value: float | None, interval: list[float] | None) -> str:
-    """Return a share in per cent with its interval."""
-    if value is None or interval is None:
-        return percent(value)
-    return f'{percent(value)} ({percent(interval[0])} to {percent(interval[1])})'
+Cell = tuple[str, list[float] | None]
+"""What is shown, and an interval of shares."""
+Row = tuple[str, list[Cell]]
+
+
+def sections(named: dict[str, Figures]) -> tuple[list[Row], list[Row], list[Row], list[Row]]:
+    """Return rows with a cell for each configuration: rates, hazards, terms, and counts."""
+    every = list(named.values())
+
+    def part(key: str, name: str) -> list[Cell]:
+        limits = f'{key}_interval'
+        return [(percent(each[key].get(name)), each[limits].get(name)) for each in every]
+
+    rates: list[Row] = [
+        (title, [(percent(each[key]), each[f'{key}_interval']) for each in every])
+        for key, title in ROWS
+    ]
+    terms = dict.fromkeys(term for each in every for term in each['iou_by_term'])
+    counts: list[Row] = [
+        ("threshold (the network's score)", [(f'{e["threshold"]:.3f}', None) for e in every]),
+        ('frames (tiles)', [(f'{e["frames"]} ({e["tiles"]})', None) for e in every]),
+        (
+            'tiles per second',
+            [('-' if e['hz'] is None else f'{e["hz"]:.1f}', None) for e in every],
+        ),
+    ]
+    hazards = [(hazard, part('false_safe_by_hazard', hazard)) for hazard in HAZARDS]
+    return rates, hazards, [(term, part('iou_by_term', term)) for term in terms], counts
 
 
 def figures_table(named: dict[str, Figures]) -> Table:
     """Return a table with a column for each configuration; in per cent unless said."""
     full = len(named) <= _FULL
     title = 'per cent, with 95 % intervals over frames' if full else 'per cent'
-    table = Table(title=title, title_justify='left')
-    table.add_column('')
+    table = Table('', title=title, title_justify='left')
     for name in named:
         table.add_column(name, justify='right', no_wrap=True)
-    for key, title in ROWS:
-        table.add_row(title, *(_cell(each, key, full=full) for each in named.values()))
-    table.add_section()
-    for hazard in HAZARDS:
-        cells = [_part(each, 'false_safe_by_hazard', hazard, full=full) for each in named.values()]
-        table.add_row(f'{hazard} called safe', *cells)
-    table.add_section()
-    for term in dict.fromkeys(term for each in named.values() for term in each['iou_by_term']):
-        cells = [_part(each, 'iou_by_term', term, full=full) for each in named.values()]
-        table.add_row(f'IoU of "{term}"', *cells)
-    table.add_section()
-    table.add_row('threshold (score)', *(f'{each["threshold"]:.3f}' for each in named.values()))
-    table.add_row('frames (tiles)', *(f'{e["frames"]} ({e["tiles"]})' for e in named.values()))
-    table.add_row('tiles per second', *(_rate(each) for each in named.values()))
+    titles = '{}', '{} called safe', 'IoU of "{}"', '{}'
+    for words, rows in zip(titles, sections(named), strict=True):
+        for name, cells in rows:
+            shown = [
+                f'{value} ({percent(limits[0])} to {percent(limits[1])})'
+                if full and limits
+                else value
+                for value, limits in cells
+            ]
+            table.add_row(words.format(name), *shown)
+        table.add_section()
     return table
-
-
-def _cell(figures: Figures, key: str, *, full: bool) -> str:
-    return with_interval(figures[key], figures[f'{key}_interval'] if full else None)
-
-
-def _part(figures: Figures, key: str, part: str, *, full: bool) -> str:
-    values: dict[str, Any] = figures[key]
-    interval = figures[f'{key}_interval'].get(part) if full else None
-    return with_interval(values.get(part), interval)
-
-
-def _rate(figures: Figures) -> str:
-    return '-' if figures['hz'] is None else f'{figures["hz"]:.1f}'
 
 
 def remarks_of(named: dict[str, Figures], outcome: Outcome) -> list[str]:
