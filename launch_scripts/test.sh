@@ -30,11 +30,6 @@ done
 
 prepare_environment "$extras"
 cd "$checkout"
-if [[ $extras == *export* ]] && ! python -m pip show --quiet open_clip_torch 2>/dev/null; then
-    # For its BPE vocabulary alone: its dependencies would replace this torch.
-    python -m pip install --quiet --disable-pip-version-check --no-deps open_clip_torch \
-        >>"$venv/install.log" 2>&1
-fi
 
 echo '== style'
 ruff check .

@@ -1,21 +1,22 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Named bundles from an index: resumable, checked, put in place whole or not at all."""
+"""Named bundles from an index, downloaded by pooch: resumable, checked, put in place whole."""
 
 from __future__ import annotations
 
 import json
+import logging
 import re
-import urllib.error
-import urllib.request
-from http.client import HTTPException
+import shutil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import TemporaryDirectory
+from typing import IO, TYPE_CHECKING, Any
 from urllib.parse import urljoin, urlsplit
+from urllib.request import url2pathname
 
 from peace_ros.core.domain import BundleError
-from peace_ros.core.inference.bundle import MANIFEST_NAME, Bundle, put_in_place, sha256_of
-from peace_ros.core.inference.manifest import FileEntry, parse_manifest
+from peace_ros.core.inference.bundle import MANIFEST_NAME, Bundle, put_in_place
+from peace_ros.core.inference.manifest import parse_manifest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,10 +25,9 @@ if TYPE_CHECKING:
     """Takes file, bytes so far and bytes in all."""
 
 _CHUNK_BYTES = 1 << 18
-_TIMEOUT_S = 30.0
+_MOST_JSON_BYTES = 1 << 20
 _NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.\-]*')
 _SCHEMES = ('http', 'https', 'file')
-_BROKEN = (HTTPException, ConnectionError, TimeoutError)
 
 
 def fetch_bundle(name: str, index: str, folder: Path, progress: Progress) -> Bundle:
@@ -37,115 +37,128 @@ def fetch_bundle(name: str, index: str, folder: Path, progress: Progress) -> Bun
         name: of the bundle in the index.
         index: URL or file of a JSON object, name -> {"url": of its folder, "sha256": of its
             manifest}; relative URLs start at the index.
-        folder: where the bundle goes; one that is there stays until the new one is whole.
-        progress: called as bytes come in.
+        folder: where the bundle goes; an older one there stays until the new one is complete.
+        progress: called as bytes arrive.
 
     Raises:
-        BundleError: no network, no such bundle, a file that differs from its checksum, no room.
-            What was downloaded so far is kept beside the folder, and the next call goes on there.
+        BundleError: no network, no such bundle, a file that differs from its checksum or is larger
+            than its manifest says, no free space, pooch is not installed. What was downloaded so
+            far is kept beside the folder, and the next call continues there.
     """
     where = index if '://' in index else Path(index).expanduser().absolute().as_uri()
-    entry = _entry(name, where)
-    base = urljoin(where, str(entry['url']).rstrip('/') + '/')
     folder = folder.expanduser().absolute()
     parts = folder.with_name(f'.{folder.name}.part')
     try:
+        with TemporaryDirectory() as aside:
+            listing = _retrieve(where, Path(aside) / 'index.json', None, _MOST_JSON_BYTES)
+            entry = _entry(name, where, listing.read_bytes())
+        base = urljoin(where, str(entry['url']).rstrip('/') + '/')
         parts.mkdir(parents=True, exist_ok=True)
-        manifest_path = parts / MANIFEST_NAME
-        manifest_path.write_bytes(_read(base + MANIFEST_NAME))
-        _check(manifest_path, str(entry['sha256']))
-        manifest = parse_manifest(manifest_path.read_bytes(), str(manifest_path))
-        for file, expected in manifest.files.items():
-            _download(base + file, parts / file, expected, progress)
+        # A manifest is small and may have changed: it is always downloaded anew.
+        (parts / MANIFEST_NAME).unlink(missing_ok=True)
+        path = _retrieve(
+            base + MANIFEST_NAME, parts / MANIFEST_NAME, str(entry['sha256']), _MOST_JSON_BYTES
+        )
+        for file, expected in parse_manifest(path.read_bytes(), str(path)).files.items():
+            _retrieve(base + file, parts / file, expected.sha256, expected.bytes, progress)
         Bundle.load(parts)
         put_in_place(parts, folder)
     except OSError as error:
         raise BundleError(
             f'{folder}: {error.strerror or error}; free some space or choose another folder '
-            '(a bundle that was there is untouched)'
+            '(an older bundle there is unchanged)'
         ) from error
     return Bundle.load(folder)
 
 
-def _entry(name: str, index: str) -> dict[str, Any]:
+def _entry(name: str, index: str, content: bytes) -> dict[str, Any]:
     try:
-        names = json.loads(_read(index))
+        names = json.loads(content)
         entry = names.get(name)
     except (ValueError, AttributeError) as error:
         raise BundleError(f'{index}: not an index of bundles ({error}); check --index') from error
-    is_whole = isinstance(entry, dict) and {'url', 'sha256'} <= {*entry}
-    if not _NAME.fullmatch(name) or not is_whole:
+    is_complete = isinstance(entry, dict) and {'url', 'sha256'} <= {*entry}
+    if not _NAME.fullmatch(name) or not is_complete:
         raise BundleError(
             f'no bundle {name!r} in {index}: it has {", ".join(sorted(names)) or "none"}'
         )
     return entry
 
 
-def _open(url: str, start: int = 0) -> Any:
+def _retrieve(
+    url: str, path: Path, sha256: str | None, most_bytes: int, progress: Progress | None = None
+) -> Path:
+    """Let pooch download and check a file unless it is there already; return its path."""
+    try:
+        import pooch  # noqa: PLC0415 - an extra, for this verb alone
+        import requests  # noqa: PLC0415 - comes with pooch
+    except ImportError as error:
+        raise BundleError(
+            f'downloads need {error.name}: install the extra "fetch" '
+            '(pip install -e ".[fetch]" in the checkout)'
+        ) from error
     if urlsplit(url).scheme not in _SCHEMES:
         raise BundleError(f'{url}: give a URL that begins with {", ".join(_SCHEMES)}')
-    request = urllib.request.Request(url)  # noqa: S310 - the scheme was checked
-    if start:
-        request.add_header('Range', f'bytes={start}-')
+    pooch.get_logger().setLevel(logging.WARNING)
     try:
-        return urllib.request.urlopen(request, timeout=_TIMEOUT_S)  # noqa: S310
-    except urllib.error.HTTPError as error:
+        download = _Download(path, most_bytes, progress)
+        pooch.retrieve(url, sha256, path.name, path.parent, downloader=download)
+    except ValueError as error:
         raise BundleError(
-            f'{url}: the server says {error.code} {error.reason}; check --index or ask who keeps it'
+            f'{url}: its SHA-256 is not the announced {sha256}; it was removed, call again or ask '
+            'the maintainer of the index'
         ) from error
-    except (urllib.error.URLError, *_BROKEN) as error:
-        remedy = (
-            'check the path'
-            if urlsplit(url).scheme == 'file'
-            else 'check the network and call again, what has come is kept'
-        )
-        reason = getattr(error, 'reason', error)
-        raise BundleError(f'{url}: cannot be reached ({reason}); {remedy}') from error
-
-
-def _read(url: str) -> bytes:
-    with _open(url) as response:
-        return b''.join(iter(lambda: _next_chunk(response, url), b''))
-
-
-def _next_chunk(response: Any, url: str) -> bytes:
-    try:
-        chunk: bytes = response.read(_CHUNK_BYTES)
-    except _BROKEN as error:
+    except (requests.RequestException, FileNotFoundError) as error:
         raise BundleError(
-            f'{url}: the connection broke ({error or type(error).__name__}); call again, the '
-            'download goes on where it stopped'
+            f'{url}: cannot be read ({error}); check --index and the network, then call again: '
+            'the download continues where it stopped'
         ) from error
-    return chunk
+    return path
 
 
-def _download(url: str, path: Path, expected: FileEntry, progress: Progress) -> None:
-    have = path.stat().st_size if path.is_file() else 0
-    if have > expected.bytes:
-        path.unlink()
-        have = 0
-    if have < expected.bytes:
-        with _open(url, have) as response:
-            # A server that knows no ranges sends the whole file again.
-            goes_on = have > 0 and getattr(response, 'status', None) == 206
-            have = have if goes_on else 0
-            with path.open('ab' if goes_on else 'wb') as file:
-                while chunk := _next_chunk(response, url):
-                    file.write(chunk)
-                    have += len(chunk)
-                    progress(path.name, have, expected.bytes)
-    if have != expected.bytes:
-        raise BundleError(
-            f'{url}: {have} of {expected.bytes} bytes came; call again, the download goes on there'
-        )
-    _check(path, expected.sha256)
+class _Download:
+    """A downloader for pooch that continues a partial file and stops at the announced size."""
 
+    def __init__(self, path: Path, most_bytes: int, progress: Progress | None) -> None:
+        self._path, self._most_bytes, self._progress = path, most_bytes, progress
+        self._file: IO[bytes]
 
-def _check(path: Path, sha256: str) -> None:
-    found = sha256_of(path)
-    if found != sha256:
-        path.unlink()
-        raise BundleError(
-            f'{path.name}: SHA-256 {found} where {sha256} is due; it was removed, call again or '
-            'ask who keeps the index'
-        )
+    def __call__(self, url: str, target: str, _: Any) -> None:
+        """Download to the file that pooch will check."""
+        from pooch import HTTPDownloader  # noqa: PLC0415
+
+        if urlsplit(url).scheme == 'file':
+            shutil.copyfile(url2pathname(urlsplit(url).path), target)
+            return
+        with self._path.open('ab') as self._file:
+            headers = {'Accept-Encoding': 'identity'}
+            if have := self._file.tell():
+                headers['Range'] = f'bytes={have}-'
+            if have < self._most_bytes:
+                HTTPDownloader(
+                    chunk_size=_CHUNK_BYTES, headers=headers, hooks={'response': self._begin}
+                )(url, self, None)
+        self._path.replace(target)
+
+    def _begin(self, response: Any, **_: Any) -> None:
+        """Start over where a server ignores ranges and sends the whole file again."""
+        if response.status_code == 200:
+            self._file.seek(0)
+            self._file.truncate()
+
+    def write(self, chunk: bytes) -> None:
+        """Append to the partial file; raises BundleError beyond the announced size."""
+        self._file.write(chunk)
+        have = self._file.tell()
+        if have > self._most_bytes:
+            self._path.unlink()
+            raise BundleError(
+                f'{self._path.name}: more than the announced {self._most_bytes} bytes came; it was '
+                'removed, ask the maintainer of the index'
+            )
+        if self._progress:
+            self._progress(self._path.name, have, self._most_bytes)
+
+    def flush(self) -> None:
+        """Do what pooch asks of a file."""
+        self._file.flush()

@@ -25,7 +25,8 @@ _WORDS = (
     r'|[^\s\p{L}\p{N}]+'
 )
 _MERGES_IN_USE = 49152 - 256 - 2
-_SHIPPED_BY, _FILE = 'open_clip', 'bpe_simple_vocab_16e6.txt.gz'
+_SHIPPED_BY, _FILE = ('clip', 'open_clip'), 'bpe_simple_vocab_16e6.txt.gz'
+"""Packages that bring OpenAI's file of merges: openai-clip (of the extra), and OpenCLIP."""
 
 
 @dataclass(frozen=True)
@@ -84,14 +85,14 @@ class Vocabulary:
 
 
 def shipped_vocabulary() -> Vocabulary:
-    """Read OpenAI's vocabulary from the installed ``open_clip_torch``; raises BundleError."""
-    spec = importlib.util.find_spec(_SHIPPED_BY)
-    folders = [] if spec is None else list(spec.submodule_search_locations or [])
+    """Read OpenAI's vocabulary from an installed package; raises BundleError."""
+    specs = [importlib.util.find_spec(name) for name in _SHIPPED_BY]
+    folders = [each for spec in specs if spec for each in spec.submodule_search_locations or ()]
     file = next((Path(each) / _FILE for each in folders if (Path(each) / _FILE).is_file()), None)
     if file is None:
         raise BundleError(
-            f'the checkpoint has no tokenizer and {_FILE} is not installed; '
-            'run: pip install --no-deps open_clip_torch'
+            f'the checkpoint has no tokenizer and {_FILE} is not installed: '
+            'run pip install openai-clip'
         )
     return read_vocabulary(file)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Downloads go on where they stopped, and only whole, unchanged bundles are put in place."""
+"""Downloads continue where they stopped; only complete, unchanged bundles are put in place."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ import functools
 import hashlib
 import http.server
 import json
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+pytest.importorskip('pooch')
 
 from peace_ros.core.domain import BundleError
 from peace_ros.core.inference import Bundle
@@ -99,19 +102,65 @@ def test_a_changed_file_is_refused_and_the_old_bundle_stays(
     content = bytearray(file.read_bytes())
     content[50] ^= 1
     file.write_bytes(bytes(content))
-    with pytest.raises(BundleError, match=r'text_encoder\.onnx: SHA-256 .* is due'):
+    with pytest.raises(BundleError, match=r'text_encoder\.onnx: its SHA-256 is not the announced'):
         fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
     assert old.load(tmp_path / 'here').checksum == old.checksum
 
 
-def test_a_cut_download_says_to_call_again(
+def test_a_cut_file_is_refused_and_nothing_bears_the_name(
     server: Any, bundle_folder: Path, tmp_path: Path
 ) -> None:
     file = bundle_folder / 'text_encoder.onnx'
     file.write_bytes(file.read_bytes()[:-10])
-    with pytest.raises(BundleError, match='bytes came; call again, the download goes on there'):
+    with pytest.raises(BundleError, match=r'not the announced .* call again or ask'):
         fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
     assert not (tmp_path / 'here').exists()
+
+
+def test_a_download_stops_at_the_announced_size(
+    server: Any, bundle_folder: Path, tmp_path: Path
+) -> None:
+    file = bundle_folder / 'text_encoder.onnx'
+    size = file.stat().st_size
+    with file.open('ab') as longer:
+        longer.truncate(200 << 20)
+    seen = []
+    with pytest.raises(BundleError, match=f'more than the announced {size} bytes came'):
+        fetch_bundle(
+            'clip-tiny', url_of(server), tmp_path / 'here', lambda *step: seen.append(step)
+        )
+    assert all(have <= most for _, have, most in seen)
+    kept = list((tmp_path / '.here.part').iterdir())
+    assert not [each for each in kept if each.name.startswith('text_encoder')]
+    assert max(each.stat().st_size for each in kept) < 1 << 20
+    assert not (tmp_path / 'here').exists()
+
+
+def test_a_server_that_ignores_ranges_sends_the_file_again(
+    bundle_folder: Path, tmp_path: Path
+) -> None:
+    class PlainHandler(RangeHandler):
+        def do_GET(self) -> None:
+            del self.headers['Range']
+            super().do_GET()
+
+    part = tmp_path / '.here.part'
+    part.mkdir()
+    (part / 'image_encoder.onnx').write_bytes(b'other')
+    handler = functools.partial(PlainHandler, directory=str(bundle_folder.parent))
+    with http.server.ThreadingHTTPServer(('127.0.0.1', 0), handler) as running:
+        running.asked = []  # type: ignore[attr-defined]
+        threading.Thread(target=running.serve_forever, daemon=True).start()
+        assert fetch_bundle('clip-tiny', url_of(running), tmp_path / 'here', no_progress)
+        running.shutdown()
+
+
+def test_without_pooch_the_extra_that_brings_it_is_named(
+    server: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, 'pooch', None)
+    with pytest.raises(BundleError, match=r'downloads need pooch: .*\[fetch\]'):
+        fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
 
 
 def test_a_broken_connection_keeps_what_came_and_the_next_call_goes_on(
@@ -148,7 +197,7 @@ def test_an_unknown_name_lists_those_there_are(server: Any, tmp_path: Path) -> N
 
 def test_no_network_is_said_and_the_old_bundle_stays(server: Any, tmp_path: Path) -> None:
     old = fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
-    with pytest.raises(BundleError, match=r'cannot be reached .* check the network'):
+    with pytest.raises(BundleError, match=r'cannot be read .* check --index and the network'):
         fetch_bundle('clip-tiny', 'http://127.0.0.1:9/index.json', tmp_path / 'here', no_progress)
     assert Bundle.load(tmp_path / 'here').checksum == old.checksum
 
@@ -161,7 +210,7 @@ def test_a_full_disk_is_said_and_the_old_bundle_stays(
     def full(*_: Any) -> None:
         raise OSError(errno.ENOSPC, 'No space left on device')
 
-    monkeypatch.setattr(fetch, '_download', full)
+    monkeypatch.setattr(fetch, '_retrieve', full)
     with pytest.raises(BundleError, match=r'here: No space left on device; free some space'):
         fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
     assert Bundle.load(tmp_path / 'here').checksum == old.checksum
@@ -170,9 +219,12 @@ def test_a_full_disk_is_said_and_the_old_bundle_stays(
 @pytest.mark.parametrize(
     ('index', 'told'),
     [
-        ('nowhere/index.json', r'index\.json: cannot be reached .*No such file.*; check the path'),
+        ('nowhere/index.json', r'index\.json: cannot be read .*No such file.*; check --index'),
         ('ftp://nowhere/index.json', 'give a URL that begins with http, https, file'),
-        ('http://127.0.0.1:9/index.json', r'\(.*refused\); check the network and call again'),
+        (
+            'http://127.0.0.1:9/index.json',
+            r'refused.*; check --index and the network, then',
+        ),
     ],
 )
 def test_an_index_that_cannot_be_read_is_refused(tmp_path: Path, index: str, told: str) -> None:
@@ -185,7 +237,7 @@ def test_a_server_without_the_files_says_whom_to_ask(
     server: Any, bundle_folder: Path, tmp_path: Path
 ) -> None:
     (bundle_folder / 'text_encoder.onnx').unlink()
-    with pytest.raises(BundleError, match=r'404 .*; check --index or ask who keeps it'):
+    with pytest.raises(BundleError, match=r'404 .*; check --index and the network'):
         fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
 
 

@@ -1,23 +1,24 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the segmenter's predictions hold: boxes, how sure they are, and coefficients of masks."""
+"""What the segmenter's predictions hold: boxes, their confidences, and coefficients of masks."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 MOST_CANDIDATES = 4096
-"""Boxes that enter the suppression; the surest ones."""
+"""Boxes that enter the suppression: those of the highest confidence."""
 MOST_DETECTIONS = 300
 """Boxes that leave it, as in the reference implementation."""
 
 
 @dataclass(frozen=True)
 class Detections:
-    """N detected segments, the surest first."""
+    """N detected segments, by falling confidence."""
 
     boxes: NDArray[np.float32]
     """[N, 4]: left, top, right, bottom in pixels of the network's input, each of some area."""
@@ -30,37 +31,28 @@ class Detections:
 def detect(
     predictions: NDArray[np.float32], *, min_confidence: float, max_overlap: float
 ) -> Detections:
-    """Return the sure boxes that are not told twice.
+    """Return the confident boxes without duplicates.
 
-    Of two boxes whose intersection over union exceeds max_overlap, the less sure one goes
-    (non-maximum suppression). At most MOST_DETECTIONS are returned.
+    Of two boxes whose intersection over union exceeds max_overlap, the one of lower confidence is
+    dropped (non-maximum suppression, by OpenCV). At most MOST_DETECTIONS are returned.
 
     Args:
         predictions: float32 [5 + K, A]; per anchor the box's centre x, y, width and height in
             pixels of the network's input, its confidence and K coefficients. Finite.
-        min_confidence: boxes must be surer than this, 0 to 1.
+        min_confidence: boxes need a higher confidence than this, 0 to 1.
         max_overlap: 0 to 1.
     """
-    sides = predictions[2:4]
-    candidates = (predictions[4] > min_confidence) & (sides > 0.0).all(axis=0)
+    candidates = (predictions[4] > min_confidence) & (predictions[2:4] > 0.0).all(axis=0)
     chosen = predictions[:, candidates].T
-    chosen = chosen[np.argsort(-chosen[:, 4], kind='stable')[:MOST_CANDIDATES]]
     half = chosen[:, 2:4] / np.float32(2.0)
-    boxes = np.concatenate([chosen[:, :2] - half, chosen[:, :2] + half], axis=1)
-    kept = _suppress(boxes, max_overlap)
-    return Detections(boxes[kept], chosen[kept, 4], np.ascontiguousarray(chosen[kept, 5:]))
-
-
-def _suppress(boxes: NDArray[np.float32], max_overlap: float) -> NDArray[np.intp]:
-    """Return the indices of the boxes, best first, that no better kept one overlaps too much."""
-    areas = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
-    kept: list[np.intp] = []
-    left = np.arange(len(boxes))
-    while left.size and len(kept) < MOST_DETECTIONS:
-        best, rest = left[0], left[1:]
-        kept.append(best)
-        low = np.maximum(boxes[best, :2], boxes[rest, :2])
-        high = np.minimum(boxes[best, 2:], boxes[rest, 2:])
-        shared = np.maximum(high - low, np.float32(0.0)).prod(axis=1)
-        left = rest[shared <= max_overlap * (areas[best] + areas[rest] - shared)]
-    return np.array(kept, np.intp)
+    low, high = chosen[:, :2] - half, chosen[:, :2] + half
+    kept = cv2.dnn.NMSBoxes(
+        np.hstack([low, high - low]).tolist(),
+        chosen[:, 4],
+        min_confidence,
+        max_overlap,
+        top_k=MOST_CANDIDATES,
+    )
+    best = np.asarray(kept, np.intp)[:MOST_DETECTIONS]
+    boxes = np.hstack([low[best], high[best]])
+    return Detections(boxes, chosen[best, 4], np.ascontiguousarray(chosen[best, 5:]))
