@@ -62,7 +62,7 @@ TELEMETRY = (
     Fault(
         'telemetry_stops',
         'telemetry',
-        'The autopilot says nothing for 2 s.',
+        'The autopilot says nothing for 3 s.',
         Autopilot('telemetry_stop', undo='telemetry_resume'),
         Expected(
             reaches=(_HOLD,),
@@ -73,7 +73,7 @@ TELEMETRY = (
             recovers_within_s=_LATER_S,
         ),
         'HOLD when the newest telemetry is 0.7 s old; goes on when it comes again.',
-        lasts_s=2.5,
+        lasts_s=3.0,
     ),
     Fault(
         'position_stops',

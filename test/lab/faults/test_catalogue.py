@@ -79,6 +79,9 @@ def test_what_has_to_happen_can_happen_before_the_fault_is_over() -> None:
         limits = (e.within_s, e.still_within_s or 0.0, e.zero_within_s or 0.0)
         # A take-over is final, so its limits may lie after the end of the injection.
         assert max(limits) < fault.lasts_s + 1.5, fault.name
+        if e.still_within_s is not None:
+            # Ground truth of some tenths of a second has to show that the vehicle stands.
+            assert e.still_within_s + 0.35 <= fault.lasts_s, fault.name
 
 
 def test_no_fault_asks_for_nothing() -> None:
