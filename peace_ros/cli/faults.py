@@ -62,7 +62,7 @@ def faults(
     chosen = choose(only or ())
     if show:
         for fault in FAULTS:
-            console.print(f'{fault.group}/{fault.name}: {fault.title}', style='bold')
+            console.print(f'{fault.group}/{fault.name}: {fault.goes_wrong}', style='bold')
             console.print(f'    {fault.at}: {describe(fault)}', highlight=False)
         raise typer.Exit(EXIT_OK)
     folder = run_dir or Path(tempfile.mkdtemp(prefix='peace_faults_'))

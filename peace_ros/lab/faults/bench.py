@@ -227,25 +227,29 @@ class FlightBench:
                 raise VehicleError(f'the landing node refuses to engage: {problem}')
             time.sleep(0.3)
 
+    def watch(self, limit_s: float, holds: Callable[[], bool] = lambda: False) -> bool:
+        """Note what ends until something holds, but for so long at most; tell whether it holds."""
+        deadline = time.monotonic() + limit_s
+        while not (there := holds()) and time.monotonic() < deadline:
+            self.look()
+            with self.node.lock:
+                self.node.lock.wait(_LOOK_S)
+        return there
+
     def wait(self, holds: Callable[[], bool], what: str, limit_s: float) -> None:
-        """Wait for something while all processes live.
+        """Wait for something that an undisturbed flight needs.
 
         Raises:
             VehicleError: it does not come in time, or a process ends.
         """
-        deadline = time.monotonic() + limit_s
-        while not holds():
-            self._check()
-            if time.monotonic() > deadline:
-                raise VehicleError(f'{what} did not come within {limit_s:g} s: see {self.folder}')
-            time.sleep(_LOOK_S)
-
-    def _check(self) -> None:
-        self.node.check()
-        for name in sorted(self._wanted):
-            if (status := self.processes.status(name)) is not None:
-                words = log_tail(self.folder / f'{name}.log')
-                raise VehicleError(f'{name} ended by itself with status {status}:\n{words}')
+        ended = self.losses.ended
+        if not self.watch(limit_s, lambda: holds() or bool(ended)):
+            raise VehicleError(f'{what} did not come within {limit_s:g} s: see {self.folder}')
+        if ended:
+            last = ended[-1]
+            raise VehicleError(
+                f'{last.name} ended by itself with status {last.status}: {last.last_words}'
+            )
 
     def ask_autopilot(self, fault: str, arguments: Mapping[str, object]) -> Answer:
         """Put a fault into the autopilot."""

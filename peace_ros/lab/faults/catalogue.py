@@ -1,22 +1,30 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All faults, and how a user names some of them."""
+"""All faults, read from ``config/faults.yaml``, and how they are chosen by name."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import yaml
 
 from peace_ros.core.domain import ConfigurationError
-from peace_ros.lab.faults import link_faults, perception_faults, vehicle_faults, world_faults
-from peace_ros.lab.faults.fault import Fault
-
-FAULTS: tuple[Fault, ...] = (
-    *perception_faults.FAULTS,
-    *world_faults.FAULTS,
-    *link_faults.FAULTS,
-    *vehicle_faults.FAULTS,
+from peace_ros.core.resources import config_dir
+from peace_ros.lab.faults.fault import (
+    GOING,
+    LOOKING_AGAIN,
+    UNDER_WAY,
+    Expected,
+    Fault,
+    FlightSetting,
+    Moment,
 )
-"""The matrix, in the order of the documentation."""
+from peace_ros.lab.faults.injections import injection
+
+_SEVERAL = {'GOING': GOING, 'LOOKING_AGAIN': LOOKING_AGAIN, 'UNDER_WAY': UNDER_WAY}
+_LISTS = ('reaches', 'allowed', 'recovers')
 REPRESENTATIVE = (
     'camera_stops',
     'pilot_takes_over_landing',
@@ -24,6 +32,48 @@ REPRESENTATIVE = (
     'executor_stalls',
 )
 """What continuous integration runs: one of each kind."""
+
+
+def load(file: Path) -> tuple[Fault, ...]:
+    """Read a matrix of faults.
+
+    Raises:
+        ConfigurationError: the file or one of its faults cannot be used.
+    """
+    try:
+        groups = yaml.safe_load(file.read_text(encoding='utf-8'))['groups']
+        rows = [(group, *row) for group, faults in groups.items() for row in faults.items()]
+    except (OSError, yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
+        raise ConfigurationError(f'faults {file} cannot be read: {error}') from error
+    return tuple(_fault(group, name, values) for group, name, values in rows)
+
+
+def _fault(group: str, name: str, values: dict[str, Any]) -> Fault:
+    makers: dict[str, Callable[[Any], Any]] = {
+        'injection': injection,
+        'lead': injection,
+        'expected': _expected,
+        'at': lambda given: Moment(**given),
+        'setting': lambda given: FlightSetting(**given),
+    }
+    try:
+        made = {key: makers[key](each) for key, each in values.items() if key in makers}
+        return Fault(**{**values, **made, 'name': name, 'group': group})
+    except (TypeError, ValueError, KeyError, AttributeError, ConfigurationError) as error:
+        raise ConfigurationError(f'fault {name} of group {group}: {error}') from error
+
+
+def _expected(given: dict[str, Any]) -> Expected:
+    lists = {
+        key: tuple(state for name in given[key] for state in _SEVERAL.get(name, (name,)))
+        for key in _LISTS
+        if key in given
+    }
+    return Expected(**{**given, **lists})
+
+
+FAULTS = load(config_dir() / 'faults.yaml')
+"""The matrix, in the order of the documentation."""
 
 
 def groups() -> tuple[str, ...]:

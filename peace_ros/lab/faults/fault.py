@@ -14,24 +14,16 @@ from peace_ros.core.landing import State
 if TYPE_CHECKING:
     from peace_ros.lab.faults.bench import FlightBench
 
-GOING = (
-    State.SEARCHING.value,
-    State.AIMING.value,
-    State.LANDING.value,
-    State.HANDOVER.value,
-)
+GOING = ('SEARCHING', 'AIMING', 'LANDING', 'HANDOVER')
 """States of a landing that is not disturbed."""
-LOOKING_AGAIN = (
-    State.WAITING.value,
-    State.CLIMBING.value,
-    State.RESTARTING.value,
-    State.SEARCHING.value,
-)
+LOOKING_AGAIN = ('WAITING', 'CLIMBING', 'RESTARTING', 'SEARCHING')
 """States of a landing that has lost its site."""
+UNDER_WAY = ('AIMING', 'LANDING', 'HANDOVER')
+"""States of a landing that has a site."""
 LEAD_BELOW_M = 45.0
-UNDER_WAY = (State.AIMING.value, State.LANDING.value, State.HANDOVER.value)
+"""True altitude at which a fault's lead begins."""
 ABSENT = ''
-"""In place of a state: the landing node says nothing."""
+"""In place of a state: the landing node is silent."""
 
 
 class Injection(Protocol):
@@ -121,9 +113,8 @@ class Fault:
     """One row of the matrix."""
 
     name: str
-    group: str
-    title: str
-    """What goes wrong, in words."""
+    goes_wrong: str
+    """In words."""
     injection: Injection
     expected: Expected
     behaviour: str
@@ -137,3 +128,5 @@ class Fault:
     setting: FlightSetting = FlightSetting()
     note: str = ''
     """What the test of this fault does not show."""
+    group: str = ''
+    """Its part of the documentation."""

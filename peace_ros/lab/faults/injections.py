@@ -12,9 +12,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
-from peace_ros.core.domain import Camera, Pose, VehicleError
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from peace_ros.core.domain import Camera, ConfigurationError, VehicleError
 from peace_ros.core.resources import models_dir
 from peace_ros.lab.faults import line, tamper
 from peace_ros.lab.faults.line import Stranger
@@ -25,18 +27,17 @@ from peace_ros.nodes.options import CameraOptions
 
 if TYPE_CHECKING:
     from peace_ros.lab.faults.bench import FlightBench
-
-PoseAt = Callable[[int], Pose | None]
+    from peace_ros.lab.faults.fault import Injection
 
 
 @dataclass(frozen=True)
 class Nothing:
     """A flight without a fault, to compare with."""
 
-    def begin(self, bench: FlightBench) -> None:
+    def begin(self, _bench: FlightBench) -> None:
         """Do nothing."""
 
-    def end(self, bench: FlightBench) -> None:
+    def end(self, _bench: FlightBench) -> None:
         """Do nothing."""
 
 
@@ -55,31 +56,6 @@ class Topic:
     def end(self, bench: FlightBench) -> None:
         """Hand on what comes."""
         bench.node.tamper(self.name, None)
-
-
-def camera(make: Callable[[], Tamper]) -> Topic:
-    """Something happens between camera and networks."""
-    return Topic(IMAGE, make)
-
-
-def heatmap(make: Callable[[], Tamper]) -> Topic:
-    """Something happens between segmentation and landing."""
-    return Topic(HEATMAP, make)
-
-
-def prompt(make: Callable[[], Tamper]) -> Topic:
-    """Something happens between prompt generator and segmentation."""
-    return Topic(PROMPT, make)
-
-
-def always(what: Tamper) -> Callable[[], Tamper]:
-    """Make a factory of a tamper that remembers nothing."""
-    return lambda: what
-
-
-def every_s(period_s: float) -> Callable[[], Tamper]:
-    """Let one message through per period."""
-    return lambda: tamper.rare(period_s, time.monotonic)
 
 
 @dataclass(frozen=True)
@@ -105,9 +81,9 @@ class Autopilot:
 class DisturbedLine:
     """Something happens to the datagrams between companion and autopilot."""
 
-    up: Callable[[], line.Tamper] | None = None
+    up: Callable[[], Tamper] | None = None
     """Companion to autopilot."""
-    down: Callable[[], line.Tamper] | None = None
+    down: Callable[[], Tamper] | None = None
 
     def begin(self, bench: FlightBench) -> None:
         """Put the tampers in."""
@@ -119,11 +95,6 @@ class DisturbedLine:
     def end(self, bench: FlightBench) -> None:
         """Mend the line."""
         bench.line.mend()
-
-
-def both_ways(make: Callable[[], line.Tamper]) -> DisturbedLine:
-    """Let the same happen in both directions."""
-    return DisturbedLine(make, make)
 
 
 @dataclass(frozen=True)
@@ -244,21 +215,23 @@ class ClockStep:
 class SecondCompanion:
     """Somebody else commands the same autopilot."""
 
-    message: Callable[[], Any]
+    message: str
+    """A key of ``_MESSAGES``."""
     rate_hz: float
     """0: sends one message."""
     _stranger: Stranger | None = None
 
     def begin(self, bench: FlightBench) -> None:
-        """Let it speak."""
+        """Begin to send."""
         self._stranger = Stranger(bench.autopilot_port)
+        make = _MESSAGES[self.message]
         if self.rate_hz > 0.0:
-            self._stranger.stream(self.message, self.rate_hz)
+            self._stranger.stream(make, self.rate_hz)
         else:
-            self._stranger.send(self.message())
+            self._stranger.send(make())
 
     def end(self, _bench: FlightBench) -> None:
-        """Let it fall silent."""
+        """Stop sending."""
         if self._stranger is not None:
             self._stranger.close()
         self._stranger = None
@@ -266,9 +239,8 @@ class SecondCompanion:
 
 @dataclass
 class ForgedTelemetry:
-    """Somebody sends the companion telemetry in the name of the autopilot."""
+    """Somebody sends the companion a position in the name of the autopilot."""
 
-    messages: Callable[[], list[bytes]]
     from_elsewhere: bool = True
     """From another address than the autopilot's."""
     rate_hz: float = 30.0
@@ -277,11 +249,11 @@ class ForgedTelemetry:
     def begin(self, bench: FlightBench) -> None:
         """Begin to send."""
         stop = threading.Event()
+        data = _forged_position()
 
         def run() -> None:
             while not stop.wait(1.0 / self.rate_hz):
-                for data in self.messages():
-                    bench.line.tell_companion(data, from_elsewhere=self.from_elsewhere)
+                bench.line.tell_companion(data, from_elsewhere=self.from_elsewhere)
 
         thread = threading.Thread(target=run, name='forger', daemon=True)
         thread.start()
@@ -354,3 +326,91 @@ class Together:
         """End all, the last first."""
         for each in reversed(self.parts):
             each.end(bench)
+
+
+def _loiter() -> Any:
+    return mavlink.MAVLink_command_long_message(
+        1, 1, mavlink.MAV_CMD_DO_SET_MODE, 0, 1.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
+
+
+def _descend() -> Any:
+    velocity_only = 0x5C7
+    return mavlink.MAVLink_set_position_target_local_ned_message(
+        *(0, 1, 1, mavlink.MAV_FRAME_LOCAL_NED, velocity_only),
+        *(0.0, 0.0, 0.0),
+        *(0.0, 0.0, 2.0),
+        *(0.0, 0.0, 0.0, 0.0, 0.0),
+    )
+
+
+def _forged_position() -> bytes:
+    codec = mavlink.MAVLink(None, 1, mavlink.MAV_COMP_ID_AUTOPILOT1)
+    message = mavlink.MAVLink_local_position_ned_message(1_000_000, 0.0, 0.0, -90.0, 0.0, 0.0, 0.0)
+    return bytes(message.pack(codec))
+
+
+_MESSAGES: dict[str, Callable[[], Any]] = {'loiter': _loiter, 'descend': _descend}
+
+
+def injection(given: dict[str, Any]) -> Injection:
+    """Return the injection that ``config/faults.yaml`` names as ``{kind: arguments}``.
+
+    Raises:
+        ConfigurationError: the kind or its tamper is unknown.
+    """
+    ((kind, arguments),) = given.items()
+    if kind not in _KINDS:
+        raise ConfigurationError(f'injection {kind!r}: choose one of {", ".join(_KINDS)}')
+    made: Injection = _call(_KINDS[kind], arguments)
+    return made
+
+
+def _call(make: Callable[..., Any], arguments: Any) -> Any:
+    """Call with the arguments of a mapping, of a list, or with one."""
+    if isinstance(arguments, dict):
+        return make(**arguments)
+    return make(*arguments) if isinstance(arguments, list) else make(arguments)
+
+
+def _tamper(name: str = '', **given: Any) -> Callable[[], Tamper]:
+    """Return the factory of a tamper: ``name``, or ``{name: arguments}``."""
+    ((name, arguments),) = given.items() if given else ((name, []),)
+    if name not in TAMPERS:
+        raise ConfigurationError(f'tamper {name!r}: choose one of {", ".join(TAMPERS)}')
+    return lambda: cast('Tamper', _call(TAMPERS[name], arguments))
+
+
+def _topic(name: str) -> Callable[..., Topic]:
+    return lambda *given, **named: Topic(name, _tamper(*given, **named))
+
+
+def _line(*, up: bool, down: bool) -> Callable[..., DisturbedLine]:
+    def make(*given: str, **named: Any) -> DisturbedLine:
+        tamper = _tamper(*given, **named)
+        return DisturbedLine(tamper if up else None, tamper if down else None)
+
+    return make
+
+
+_KINDS: dict[str, Callable[..., Injection]] = {
+    'camera': _topic(IMAGE),
+    'heatmap': _topic(HEATMAP),
+    'prompt': _topic(PROMPT),
+    'autopilot': Autopilot,
+    'line': _line(up=True, down=True),
+    'line_up': _line(up=True, down=False),
+    'line_down': _line(up=False, down=True),
+    'second_companion': SecondCompanion,
+    'forged_telemetry': ForgedTelemetry,
+    'kill': Killed,
+    'suspend': Suspended,
+    'stall': Stalled,
+    'model': BadModel,
+    'bundle': BadBundle,
+    'clock_step': ClockStep,
+    'person': Person,
+    'full_disk': FullDisk,
+    'together': lambda *parts: Together(tuple(injection(each) for each in parts)),
+}
+TAMPERS: dict[str, Callable[..., Tamper]] = {**tamper.TAMPERS, **line.TAMPERS}

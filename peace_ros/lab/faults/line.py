@@ -20,30 +20,14 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.lab.faults.record import Sent
+from peace_ros.lab.faults.tamper import Late, Tamper, always, untouched
 
-Late = tuple[float, bytes]
-Tamper = Callable[[bytes], Iterable[Late]]
 _POLL_S = 0.05
 _TIMESTAMPNS = 35
 """SO_TIMESTAMPNS of Linux, which Python's socket module does not name."""
 _TIMESPEC = struct.Struct('@qq')
 _LARGEST = 65535
 _HOST = '127.0.0.1'
-
-
-def untouched(data: bytes) -> Iterable[Late]:
-    """Hand on what comes."""
-    return ((0.0, data),)
-
-
-def nothing(_data: bytes) -> Iterable[Late]:
-    """Lose everything."""
-    return ()
-
-
-def late(seconds: float) -> Tamper:
-    """Hold every datagram back."""
-    return lambda data: ((seconds, data),)
 
 
 def doubled(data: bytes) -> Iterable[Late]:
@@ -75,6 +59,14 @@ def damaged(every: int) -> Tamper:
         return ((0.0, bytes(broken)),)
 
     return tamper
+
+
+TAMPERS: dict[str, Callable[..., Tamper]] = {
+    'doubled': always(doubled),
+    'shuffled': shuffled,
+    'damaged': damaged,
+}
+"""Name -> factory of what happens to datagrams, beside what happens to any message."""
 
 
 class RelayedLine:

@@ -7,7 +7,8 @@ from __future__ import annotations
 import heapq
 import threading
 import time
-from collections import OrderedDict
+from bisect import bisect_left
+from collections import OrderedDict, deque
 from typing import Any
 
 import rclpy
@@ -15,6 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_msgs.msg import Float64, String
@@ -39,30 +41,43 @@ _RELAYED: dict[str, tuple[Any, Any, Any]] = {
     HEATMAP: (Image, qos.IMAGE_IN, qos.IMAGE_OUT),
     PROMPT: (DiagnosticArray, qos.RESULT, qos.RESULT),
 }
+_EVIDENCE = QoSProfile(depth=1000)
+"""Reliable and deep: a busy bench hears status and ground truth late, but misses none."""
 _KEPT_POSES = 6000
 """Two minutes of ground truth."""
+_KEPT_TURNS = 30_000
 _NEAR_NS = 300_000_000
 _RELEASE_S = 0.01
 _JOIN_S = 5.0
 
 
 class BenchNode:
-    """Spins in a thread of its own; the lists are read under :attr:`lock`."""
+    """Spins in a thread of its own; the lists are read under :attr:`lock`.
+
+    All times are of the steady clock. Those of status and ground truth are the times at which they
+    were published, so that they hold on a busy machine too.
+    """
 
     def __init__(self) -> None:
-        self.lock = threading.RLock()
+        self.lock = threading.Condition()
+        """Notified when a status or a pose has come."""
         self.said: list[Said] = []
-        """``landing/status`` by the steady clock."""
         self.values: dict[str, str] = {}
         """Pairs of the newest status."""
         self.truths: list[TruthSample] = []
         self.heatmaps = 0
         """Heatmaps that were handed on since the last :meth:`forget`."""
+        self.heatmaps_s: list[float] = []
+        """When the segmentation node gave a heatmap, whether it was handed on or not."""
+        self.turns_s: deque[float] = deque(maxlen=_KEPT_TURNS)
+        """When the relay looked at its queue: every 10 ms while it gets the processor."""
         self.clock_step_ns = 0
         """Added to ``/clock``."""
         self._tampers: dict[str, Tamper] = dict.fromkeys(_RELAYED, untouched)
         self._poses: OrderedDict[int, Pose] = OrderedDict()
-        self._heard_s: OrderedDict[int, float] = OrderedDict()
+        self._since_s = time.monotonic()
+        self._epoch_s = time.time() - self._since_s
+        """Zero of the steady clock, on the wall clock."""
         self._queue: list[tuple[float, int, str, Any]] = []
         self._count = 0
         self._failure: Exception | None = None
@@ -77,9 +92,9 @@ class BenchNode:
         self._clock_out = self._node.create_publisher(Clock, '/clock', qos.CLOCK)
         self._node.create_subscription(Clock, RAW + 'clock', self._on_clock, qos.CLOCK)
         self._node.create_subscription(
-            DiagnosticArray, 'landing/status', self._on_status, qos.RESULT
+            DiagnosticArray, 'landing/status', self._on_status, _EVIDENCE
         )
-        self._node.create_subscription(PoseStamped, 'ground_truth/pose', self._on_pose, qos.POSE)
+        self._node.create_subscription(PoseStamped, 'ground_truth/pose', self._on_pose, _EVIDENCE)
         self._stall = self._node.create_publisher(Float64, 'fault/stall', qos.RESULT)
         self._model = self._node.create_publisher(String, 'fault/model', qos.RESULT)
         self._engage = self._node.create_client(Trigger, 'landing/engage')
@@ -106,7 +121,10 @@ class BenchNode:
             self.said.clear()
             self.values = {}
             self.truths.clear()
+            self._since_s = time.monotonic()
+            self._epoch_s = time.time() - self._since_s
             self.heatmaps = 0
+            self.heatmaps_s.clear()
             self.clock_step_ns = 0
             self._queue.clear()
             self._tampers = dict.fromkeys(_RELAYED, untouched)
@@ -130,13 +148,12 @@ class BenchNode:
             return self._poses[nearest]
 
     def pose_near(self, at_s: float) -> Pose | None:
-        """Return the true pose that was heard next to a moment of the steady clock."""
+        """Return the true pose that was published next to a moment."""
         with self.lock:
-            heard = list(self._heard_s.items())
-            if not heard:
-                return None
-            stamp_ns, _ = min(heard, key=lambda item: abs(item[1] - at_s))
-            return self._poses.get(stamp_ns)
+            after = bisect_left(self.truths, at_s, key=lambda truth: truth.at_s)
+            near = self.truths[max(0, after - 1) : after + 1]
+            nearest = min(near, key=lambda truth: abs(truth.at_s - at_s), default=None)
+            return None if nearest is None else self._poses.get(nearest.stamp_ns)
 
     def site(self) -> tuple[float, float] | None:
         """Return north and east of the site that the landing has chosen, None without one."""
@@ -159,10 +176,6 @@ class BenchNode:
     def fail_model(self, fault: str) -> None:
         """Tell the segmentation node what its model shall do; empty: work."""
         self._model.publish(String(data=fault))
-
-    def model_listens(self) -> bool:
-        """Whether a segmentation node hears :meth:`fail_model`."""
-        return bool(self._model.get_subscription_count())
 
     def engage(self, limit_s: float) -> str:
         """Call the landing node's service; return why it refuses, empty when it began.
@@ -195,6 +208,8 @@ class BenchNode:
     def _relay(self, name: str) -> Any:
         def take(message: Any) -> None:
             with self.lock:
+                if name == HEATMAP:
+                    self.heatmaps_s.append(time.monotonic())
                 for delay_s, each in self._tampers[name](message):
                     if delay_s <= 0.0:
                         self._hand_on(name, each)
@@ -216,6 +231,7 @@ class BenchNode:
 
     def _release(self) -> None:
         with self.lock:
+            self.turns_s.append(time.monotonic())
             while self._queue and self._queue[0][0] <= time.monotonic():
                 _, _, name, message = heapq.heappop(self._queue)
                 self._hand_on(name, message)
@@ -224,20 +240,33 @@ class BenchNode:
         at_ns = ns_from_time(message.clock) + self.clock_step_ns
         self._clock_out.publish(Clock(clock=time_from_ns(at_ns)))
 
-    def _on_status(self, message: DiagnosticArray) -> None:
+    def _on_status(self, message: DiagnosticArray, info: dict[str, int]) -> None:
         values = diagnostic_values(message)
-        at_s = time.monotonic()
         with self.lock:
+            at_s = self._published_s(info)
+            if at_s < self._since_s:
+                return  # of the landing node before this one
             self.values = values
             self.said.append(Said(at_s, values.get('state', ''), values.get('reason', '')))
+            self.lock.notify_all()
 
-    def _on_pose(self, message: PoseStamped) -> None:
+    def _on_pose(self, message: PoseStamped, info: dict[str, int]) -> None:
         pose = pose_from_message(message)
-        at_s = time.monotonic()
         with self.lock:
-            self.truths.append(TruthSample(at_s, pose.north_m, pose.east_m, pose.altitude_agl_m))
+            self.truths.append(
+                TruthSample(
+                    self._published_s(info),
+                    pose.north_m,
+                    pose.east_m,
+                    pose.altitude_agl_m,
+                    pose.stamp_ns,
+                )
+            )
             self._poses[pose.stamp_ns] = pose
-            self._heard_s[pose.stamp_ns] = at_s
             while len(self._poses) > _KEPT_POSES:
                 self._poses.popitem(last=False)
-                self._heard_s.popitem(last=False)
+            self.lock.notify_all()
+
+    def _published_s(self, info: dict[str, int]) -> float:
+        """Return when DDS was given a message (it stamps in wall time), on the steady clock."""
+        return info['source_timestamp'] * 1e-9 - self._epoch_s

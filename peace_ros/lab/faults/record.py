@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import hypot, inf, nan
 
 from peace_ros.core.landing import State
@@ -18,7 +20,7 @@ _SLOPE_S = 0.3
 
 @dataclass(frozen=True)
 class Said:
-    """One ``landing/status``."""
+    """One ``landing/status``, at the time at which it was published."""
 
     at_s: float
     state: str
@@ -27,12 +29,14 @@ class Said:
 
 @dataclass(frozen=True)
 class TruthSample:
-    """Where the vehicle truly was."""
+    """Where the vehicle truly was when the simulator published it."""
 
     at_s: float
     north_m: float
     east_m: float
     altitude_agl_m: float
+    stamp_ns: int = 0
+    """Of the pose, by the node clock."""
 
 
 @dataclass(frozen=True)
@@ -46,19 +50,19 @@ class Sent:
 
     @property
     def is_zero(self) -> bool:
-        """Zero means zero."""
+        """Every component is exactly zero."""
         return self.v_north_m_s == self.v_east_m_s == self.v_down_m_s == 0.0
 
 
 @dataclass(frozen=True)
 class Ended:
-    """A process that is no more, or its return."""
+    """A process that has ended."""
 
     at_s: float
     name: str
     status: int
     meant: bool
-    """The matrix ended it; otherwise it ended by itself."""
+    """The fault ended it; otherwise it ended by itself."""
     last_words: str = ''
 
 
@@ -91,6 +95,8 @@ class Record:
     """When somebody else than the companion began to fly."""
     trouble: str = ''
     """Why the fault could not be tried at all."""
+    slow: str = ''
+    """Why the machine was too slow for a verdict, empty when it kept up."""
 
     @property
     def fault_end_s(self) -> float:
@@ -130,6 +136,10 @@ class Record:
         fast = [at_s for at_s, speed in self.descents(0.0, end_s) if speed > limit_m_s]
         return fast[-1] if fast else 0.0
 
+    def truth_gap_s(self, begin_s: float, end_s: float) -> float:
+        """Return the longest time between two moments without ground truth."""
+        return longest_gap_s((t.at_s for t in self.truths), begin_s, end_s)
+
     def lowest_m(self, until_s: float = inf) -> float:
         """Return the lowest true altitude since the injection."""
         heights = [t.altitude_agl_m for t in self.truths if t.at_s <= until_s]
@@ -143,8 +153,14 @@ class Record:
         return hypot(last.north_m - first.north_m, last.east_m - first.east_m)
 
 
+def longest_gap_s(times_s: Iterable[float], begin_s: float, end_s: float) -> float:
+    """Return the longest time between two moments in which nothing came."""
+    inside = [at_s for at_s in times_s if begin_s < at_s < end_s]
+    return max(b - a for a, b in pairwise((begin_s, *inside, end_s)))
+
+
 STILL = frozenset(
     state.value for state in (State.IDLE, State.WAITING, State.HANDOVER, State.HOLD, State.ABORTED)
 )
-"""States in which the set-point has to be zero, written down here a second time on purpose: the
-judge does not ask the accused."""
+"""States in which the set-point has to be zero. They are listed here a second time on purpose: the
+judge does not rely on what the landing says of itself."""

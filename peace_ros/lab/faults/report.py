@@ -34,6 +34,8 @@ def figures(results: Results, duration_s: float) -> dict[str, Any]:
         'unsafe_handovers': sum(int(row['unsafe_handovers']) for row in rows),
         'crashes': sum(int(row['crashes']) for row in rows),
         'hangs': sum(int(row['hangs']) for row in rows),
+        'repeated': sum(row['attempts'] > 1 for row in rows),
+        'too_slow': sum(bool(row['slow']) and not row['passed'] for row in rows),
         'setpoint_gap_s': gap_figures(results.gaps_s),
         'reaction_to_pilot_s': _worst(rows, _TAKE_OVERS, 'last_setpoint_s'),
         'dead_man_s': _worst(rows, _DEAD_MAN, 'last_motion_s'),
@@ -81,8 +83,12 @@ def line(row: Row) -> str:
     took = '' if row['took_s'] is None else f' after {row["took_s"]:.1f} s'
     word = 'passed' if row['passed'] else 'FAILED'
     states = ' > '.join(row['states'][-6:])
-    told = f'{word}  {row["name"]}{took}: {states}'
-    return told if row['passed'] else f'{told}\n        ' + '\n        '.join(row['failures'])
+    told = [f'{word}  {row["name"]}{took}: {states}', *row['failures']]
+    if row['attempts'] > 1:
+        told.append(f'{row["attempts"]} flights')
+    if row['slow'] and (row['attempts'] > 1 or not row['passed']):
+        told.append(f'no fair test, the machine was too slow: {row["slow"]}')
+    return '\n        '.join(told)
 
 
 def table(told: dict[str, Any]) -> Table:
@@ -92,7 +98,7 @@ def table(told: dict[str, Any]) -> Table:
     grid.add_column()
     gaps = told['setpoint_gap_s']
     grid.add_row('faults', f'{told["passed"]} of {told["faults"]} as documented')
-    for key in ('unsafe_handovers', 'crashes', 'hangs'):
+    for key in ('unsafe_handovers', 'crashes', 'hangs', 'repeated', 'too_slow'):
         grid.add_row(key.replace('_', ' '), str(told[key]))
     if gaps['count']:
         grid.add_row(

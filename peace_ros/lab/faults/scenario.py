@@ -7,24 +7,39 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import TypeVar
 
 from peace_ros.core.domain import PeaceError
 from peace_ros.core.landing import LandingParameters, State
 from peace_ros.lab.faults.bench import FlightBench
 from peace_ros.lab.faults.fault import ABSENT, LEAD_BELOW_M, Fault, Moment
-from peace_ros.lab.faults.record import STANDING_M_S, Record, Said, Sent
+from peace_ros.lab.faults.record import (
+    STANDING_M_S,
+    Ended,
+    Record,
+    Said,
+    Sent,
+    TruthSample,
+    longest_gap_s,
+)
 from peace_ros.lab.faults.walker import Walker
 from peace_ros.nodes.options import CameraOptions
 from peace_ros.simulation.camera import NadirCamera
 from peace_ros.simulation.demo.truth import judge as judge_ground
 
-_LOOK_S = 0.02
-_MOMENT_S = 45.0
+_MOMENT_S = 90.0
 """How long the landing may take to come to the moment of the injection."""
 _MOVING_M_S = 0.7
 _AFTER_S = 1.0
 """The observation goes on for this long after the recovery, and after what stays for good."""
 _STAY_S = 3.0
+_PAUSE_S = 0.3
+"""The relay runs every 10 ms and the vehicle publishes every 20 ms: a machine that lets one of
+them wait for so long is too slow for limits of some tenths of a second."""
+_HEATMAP_S = 1.0
+"""The networks give six heatmaps per second: the limits need one in this time at least."""
+
+_Event = TypeVar('_Event', Said, TruthSample, Sent, Ended)
 
 
 @dataclass
@@ -72,13 +87,7 @@ class Scenario:
         self._watch_recovery()
 
     def _await_moment(self, at: Moment) -> None:
-        deadline = time.monotonic() + _MOMENT_S
-        while not self._is_moment(at.state, at.below_m):
-            self.bench.look()
-            if time.monotonic() > deadline or self.bench.losses.ended:
-                state = self.bench.state()
-                raise _NoMomentError(f'the landing never was {at}: it is in {state or "silence"}')
-            time.sleep(_LOOK_S)
+        self.bench.wait(lambda: self._is_moment(at.state, at.below_m), f'a landing {at}', _MOMENT_S)
 
     def _is_moment(self, state: str, below_m: float) -> bool:
         if self.bench.state() != state:
@@ -106,53 +115,45 @@ class Scenario:
 
     def _watch_refusal(self) -> None:
         """The fault is there before the engagement: ask once, and take the answer."""
-        time.sleep(self.fault.lasts_s)
+        self.bench.watch(self.fault.lasts_s)
         answer = self.bench.node.engage(10.0)
         self.record.refusal = answer or None
 
     def _watch_fault(self) -> None:
-        deadline = self.injected_s + self.fault.lasts_s
-        while time.monotonic() < deadline:
-            self.bench.look()
-            if self.fault.until_reached and self._has_reached(self.fault.expected.reaches, 0.0):
-                time.sleep(_AFTER_S)
-                return
-            time.sleep(_LOOK_S)
+        fault = self.fault
+        limit_s = self.injected_s + fault.lasts_s - time.monotonic()
+        states = fault.expected.reaches if fault.until_reached else ()
+        if self.bench.watch(limit_s, lambda: self._has_reached(states, self.injected_s)):
+            self.bench.watch(_AFTER_S)
 
     def _watch_recovery(self) -> None:
         expected = self.fault.expected
         begin_s = time.monotonic()
         wait_s = expected.recovers_within_s if expected.recovers else 0.0
-        while time.monotonic() < begin_s + wait_s + _AFTER_S:
-            self.bench.look()
-            if self._has_reached(expected.recovers, begin_s):
-                break
-            time.sleep(_LOOK_S)
-        time.sleep(_STAY_S if expected.stays else _AFTER_S)
-        self.bench.look()
+        self.bench.watch(wait_s + _AFTER_S, lambda: self._has_reached(expected.recovers, begin_s))
+        self.bench.watch(_STAY_S if expected.stays else _AFTER_S)
 
     def _has_reached(self, states: tuple[str, ...], since_s: float) -> bool:
         wanted = [state for state in states if state != ABSENT]
-        since_s = max(since_s, self.injected_s)
         with self.bench.node.lock:
             return any(s.state in wanted for s in self.bench.node.said if s.at_s >= since_s)
 
     def _close(self) -> None:
         """Bring everything that was seen onto the clock of the record."""
         bench, record, zero_s = self.bench, self.record, self.injected_s
+
+        def shifted(events: list[_Event], begin_s: float) -> list[_Event]:
+            return [replace(e, at_s=e.at_s - zero_s) for e in events if e.at_s >= begin_s]
+
         now_s = time.monotonic()
         record.closed_s = now_s - zero_s
         with bench.node.lock:
-            said, truths = list(bench.node.said), list(bench.node.truths)
-        record.said = [
-            Said(s.at_s - zero_s, s.state, s.reason) for s in said if s.at_s >= self.engaged_s
-        ]
-        record.truths = [replace(t, at_s=t.at_s - zero_s) for t in truths if t.at_s >= zero_s]
-        record.sent = [
-            Sent(s.at_s - zero_s, s.v_north_m_s, s.v_east_m_s, s.v_down_m_s)
-            for s in bench.line.sent_since(zero_s)
-        ]
-        record.ended = [replace(e, at_s=e.at_s - zero_s) for e in bench.losses.ended]
+            said = list(bench.node.said)
+            record.truths = shifted(bench.node.truths, zero_s)
+        record.said = shifted(said, self.engaged_s)
+        record.sent = shifted(bench.line.sent_since(zero_s), zero_s)
+        record.ended = shifted(bench.losses.ended, 0.0)
+        record.slow = self._slowness()
         record.stopped_s = [
             (a - zero_s, b - zero_s) for a, b in bench.losses.spans([s.at_s for s in said], now_s)
         ]
@@ -163,6 +164,29 @@ class Scenario:
         self._judge_handovers(walker)
         if walker is not None:
             self._watch_person(walker)
+
+    def _slowness(self) -> str:
+        """Return what shows that the machine was too slow for the limits, empty when nothing."""
+        node, zero_s, end_s = self.bench.node, self.injected_s, time.monotonic()
+        with node.lock:
+            turns_s, heatmaps_s = list(node.turns_s), list(node.heatmaps_s)
+        told = []
+        for what, gap_s, limit_s in (
+            ('the relay stood still', longest_gap_s(turns_s, zero_s, end_s), _PAUSE_S),
+            (
+                'the simulated vehicle stood still',
+                self.record.truth_gap_s(0.0, self.record.closed_s - _PAUSE_S),
+                _PAUSE_S,
+            ),
+            (
+                'before the fault no heatmap came',
+                longest_gap_s(heatmaps_s, self.engaged_s or zero_s, zero_s),
+                _HEATMAP_S,
+            ),
+        ):
+            if gap_s > limit_s:
+                told.append(f'{what} for {gap_s:.1f} s, {limit_s:g} s allowed')
+        return '; '.join(told)
 
     def _watch_person(self, walker: Walker) -> None:
         """Note for how long the vehicle descended with the person below."""
@@ -191,10 +215,6 @@ class Scenario:
     def _unsafe(self, camera: NadirCamera, walker: Walker | None, at_s: float) -> str:
         """Return what the truth has against a hand-over at a moment, empty when nothing."""
         return unsafe_ground(self.bench, camera, walker, at_s + self.injected_s)
-
-
-class _NoMomentError(PeaceError):
-    """The landing did not come to the moment of the injection."""
 
 
 def unsafe_ground(

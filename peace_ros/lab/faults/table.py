@@ -36,7 +36,7 @@ def markdown() -> str:
             if fault.group == group:
                 tested = f'{fault.at}: {describe(fault)}'
                 tested += f'. {fault.note}' if fault.note else ''
-                cells = (f'`{fault.name}`', fault.title, fault.behaviour, tested)
+                cells = (f'`{fault.name}`', fault.goes_wrong, fault.behaviour, tested)
                 parts.append(f'| {" | ".join(cell.replace("|", "/") for cell in cells)} |\n')
     return ''.join(parts)
 
@@ -45,7 +45,7 @@ def _introduction() -> str:
     return f"""\
 # What happens when something fails
 
-Written by `python -m peace_ros.lab.faults.table` from the same definitions that `peace faults`
+Written by `python -m peace_ros.lab.faults.table` from `config/faults.yaml`, which `peace faults`
 flies; a test keeps them equal. {len(FAULTS)} faults.
 
     peace faults                                  # all of them, with a report

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import time
 from array import array
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -37,7 +38,7 @@ def late(seconds: float) -> Tamper:
     return lambda message: ((seconds, message),)
 
 
-def rare(period_s: float, clock_s: Callable[[], float]) -> Tamper:
+def rare(period_s: float, clock_s: Callable[[], float] = time.monotonic) -> Tamper:
     """Let one message through per period."""
     due_s = [-1e9]
 
@@ -197,6 +198,21 @@ def without_term(message: Any) -> Iterable[Late]:
         for pair in status.values:
             pair.value = pair.value.replace('{term}', 'nothing')
     return ((0.0, message),)
+
+
+def always(what: Tamper) -> Callable[[], Tamper]:
+    """Return the factory of a tamper that remembers nothing."""
+    return lambda: what
+
+
+TAMPERS: dict[str, Callable[..., Tamper]] = {
+    each.__name__: each
+    for each in (
+        *(late, rare, frozen, filled, noisy, flickering, of_encoding, resized, shifted),
+        *(equal_stamps, running_back),
+    )
+} | {each.__name__: always(each) for each in (untouched, nothing, cut_short, without_term)}
+"""Name -> factory, called when a fault is injected: a tamper may remember."""
 
 
 def pixels_of(message: Any) -> NDArray[np.uint8]:

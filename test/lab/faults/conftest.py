@@ -22,7 +22,7 @@ def stopping() -> Fault:
         recovers=('LANDING',),
         recovers_within_s=4.0,
     )
-    return Fault('stops', 'test', 'Something stops.', Nothing(), expected, 'HOLD.')
+    return Fault('stops', 'Something stops.', Nothing(), expected, 'HOLD.')
 
 
 def landing(*, hold_s: float = 2.0, fault_s: float = 5.0, end_s: float = 8.0) -> Record:

@@ -11,8 +11,8 @@ import pytest
 
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.landing import State
-from peace_ros.lab.faults.catalogue import FAULTS, REPRESENTATIVE, choose, groups, named
-from peace_ros.lab.faults.fault import GOING
+from peace_ros.lab.faults.catalogue import FAULTS, REPRESENTATIVE, choose, groups, load, named
+from peace_ros.lab.faults.fault import GOING, UNDER_WAY
 from peace_ros.lab.faults.table import markdown
 
 DOCS = Path(__file__).resolve().parents[3] / 'docs'
@@ -68,7 +68,7 @@ def test_every_fault_has_a_name_of_its_own_and_its_sentences() -> None:
     assert len(names) == len(set(names)) >= 45
     assert not set(names) & set(groups())
     for fault in FAULTS:
-        assert fault.title.endswith('.'), fault.name
+        assert fault.goes_wrong.endswith('.'), fault.name
         assert fault.behaviour.endswith('.'), fault.name
         assert fault.at.state in {state.value for state in State}
 
@@ -79,6 +79,9 @@ def test_what_has_to_happen_can_happen_before_the_fault_is_over() -> None:
         limits = (e.within_s, e.still_within_s or 0.0, e.zero_within_s or 0.0)
         # A take-over is final, so its limits may lie after the end of the injection.
         assert max(limits) < fault.lasts_s + 1.5, fault.name
+        if e.still_within_s is not None:
+            # Ground truth of some tenths of a second has to show that the vehicle stands.
+            assert e.still_within_s + 0.35 <= fault.lasts_s, fault.name
 
 
 def test_no_fault_asks_for_nothing() -> None:
@@ -123,3 +126,55 @@ def test_the_documentation_is_current() -> None:
     text = (DOCS / 'faults.md').read_text(encoding='utf-8')
     assert text == markdown(), 'python -m peace_ros.lab.faults.table > docs/faults.md'
     assert all(f'| `{fault.name}` |' in text for fault in FAULTS)
+
+
+GOOD = {
+    'goes_wrong': 'Something.',
+    'injection': '{camera: {late: 2.0}}',
+    'expected': '{reaches: [HOLD], within_s: 1.0, allowed: [UNDER_WAY, HOLD]}',
+    'behaviour': 'HOLD.',
+}
+
+
+def written(folder: Path, **changes: str) -> Path:
+    file = folder / 'faults.yaml'
+    lines = [f'      {key}: {value}' for key, value in {**GOOD, **changes}.items()]
+    file.write_text('\n'.join(['groups:', '  mine:', '    my_fault:', *lines]))
+    return file
+
+
+def test_a_fault_is_read_from_a_file(tmp_path: Path) -> None:
+    (fault,) = load(written(tmp_path, lead='{heatmap: nothing}', at='{state: HOLD}'))
+    assert (fault.name, fault.group, fault.at.state) == ('my_fault', 'mine', 'HOLD')
+    assert fault.expected.allowed == (*UNDER_WAY, 'HOLD')
+    ((delay_s, message),) = fault.injection.make()('picture')
+    assert (delay_s, message) == (2.0, 'picture')
+    assert list(fault.lead.make()('heatmap')) == []
+
+
+@pytest.mark.parametrize(
+    ('key', 'value', 'words'),
+    [
+        ('injection', '{earthquake: 3}', "injection 'earthquake'"),
+        ('injection', '{camera: {shaken: 3}}', "tamper 'shaken'"),
+        ('injection', '{autopilot: [altitude], kill: landing}', 'my_fault'),
+        ('expected', '{reaches: [HOLDING], within_s: 1.0}', "state 'HOLDING'"),
+        ('expected', '{reaches: [HOLD]}', 'within 0.0 s'),
+        ('at', '{above_m: 3.0}', 'above_m'),
+        ('colour', 'red', 'colour'),
+    ],
+)
+def test_a_fault_that_cannot_be_used_is_refused_by_name(
+    tmp_path: Path, key: str, value: str, words: str
+) -> None:
+    with pytest.raises(ConfigurationError, match='fault my_fault of group mine') as refused:
+        load(written(tmp_path, **{key: value}))
+    assert words in str(refused.value)
+
+
+def test_a_matrix_that_is_no_matrix_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / 'faults.yaml'
+    for text in ('', 'groups: 3', '{'):
+        file.write_text(text)
+        with pytest.raises(ConfigurationError, match='cannot be read'):
+            load(file)

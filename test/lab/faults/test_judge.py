@@ -62,6 +62,13 @@ def test_no_ground_truth_is_no_proof_of_standing(stopping: Fault, record: Record
     assert any('no ground truth' in each for each in judge(stopping, record).failures)
 
 
+def test_ground_truth_with_a_hole_is_no_proof_either(stopping: Fault, record: Record) -> None:
+    record.truths = [t for t in record.truths if not 3.6 < t.at_s < 4.4]
+    assert any('no ground truth for 0.80' in f for f in judge(stopping, record).failures)
+    record.truths = []
+    assert any('no ground truth for 2.00' in f for f in judge(stopping, record).failures)
+
+
 def test_motion_on_the_wire_in_hold_fails(stopping: Fault, record: Record) -> None:
     record.sent.append(Sent(4.0, 0.0, 0.0, -0.01))
     failures = judge(stopping, record).failures

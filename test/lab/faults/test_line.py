@@ -12,7 +12,7 @@ from contextlib import suppress
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.lab.faults import line
+from peace_ros.lab.faults import line, tamper
 from peace_ros.lab.faults.line import RelayedLine, messages_of
 
 
@@ -85,7 +85,7 @@ def test_both_directions_pass(ends: Ends) -> None:
 def test_a_lost_line_loses_and_a_mended_one_does_not(ends: Ends) -> None:
     ends.up(b'first')
     ends.arrived(1)
-    ends.line.up = ends.line.down = line.nothing
+    ends.line.up = ends.line.down = tamper.nothing
     ends.up(b'lost')
     ends.down(b'lost too')
     assert ends.arrived() == []
@@ -96,7 +96,7 @@ def test_a_lost_line_loses_and_a_mended_one_does_not(ends: Ends) -> None:
 
 
 def test_late_datagrams_arrive_late_and_in_order(ends: Ends) -> None:
-    ends.line.up = line.late(0.15)
+    ends.line.up = tamper.late(0.15)
     began = time.monotonic()
     ends.up(b'1')
     ends.up(b'2')
@@ -105,7 +105,7 @@ def test_late_datagrams_arrive_late_and_in_order(ends: Ends) -> None:
 
 
 def test_set_points_are_measured_even_when_they_are_lost(ends: Ends) -> None:
-    ends.line.up = line.nothing
+    ends.line.up = tamper.nothing
     began = time.monotonic()
     for speed in (0.0, 1.5):
         ends.up(velocity(speed))

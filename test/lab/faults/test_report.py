@@ -32,12 +32,25 @@ def test_the_report_counts_what_went_wrong(stopping: Fault, record: Record) -> N
     told = report.figures(Results(rows(stopping, record), [0.05] * 98 + [0.2, 0.4]), 61.0)
     assert (told['faults'], told['passed'], told['unsafe_handovers']) == (2, 1, 1)
     assert (told['crashes'], told['hangs']) == (0, 0)
+    assert (told['repeated'], told['too_slow']) == (0, 0)
     assert told['dead_man_s'] == pytest.approx(1.91)
     assert told['reaction_to_pilot_s'] == pytest.approx(4.91, abs=0.11)
     assert told['setpoint_gap_s'] == {'count': 100, 'p50': 0.05, 'p99': 0.202, 'max': 0.4}
-    assert report.table(told).row_count == 8
+    assert report.table(told).row_count == 10
     assert report.line(told['rows'][0]).startswith('passed  executor_stalls after 2.0 s')
     assert 'roof' in report.line(told['rows'][1])
+
+
+def test_the_report_tells_what_was_flown_twice_and_what_got_no_fair_test(
+    stopping: Fault, record: Record
+) -> None:
+    good, bad = rows(stopping, record)
+    for row in (good, bad):
+        row.update(attempts=2, slow='the relay stood still for 0.9 s')
+    told = report.figures(Results([good, bad], []), 61.0)
+    assert (told['repeated'], told['too_slow']) == (2, 1)
+    assert '2 flights' in report.line(good)
+    assert 'too slow: the relay stood still for 0.9 s' in report.line(bad)
 
 
 def test_the_report_is_json_and_a_bad_place_is_said(
