@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
 #
@@ -12,16 +13,31 @@ die() {
     exit 2
 }
 
+# Print the path of the first usable interpreter. $PYTHON, where it is set, is the only candidate.
 find_python() {
-    local candidate
-    for candidate in ${PYTHON:-} python3.12 python3.11 python3.10 python3; do
-        if "$candidate" -c 'import sys, venv, ensurepip
-sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 12))' 2>/dev/null; then
+    local candidate problem problems=
+    for candidate in ${PYTHON:-python3.12 python3.13 python3.14 python3.11 python3.10 python3}; do
+        command -v "$candidate" >/dev/null || {
+            problems+="  $candidate: not found"$'\n'
+            continue
+        }
+        problem=$("$candidate" -c '
+import platform, sys
+version = "{} {}.{}".format(platform.python_implementation(), *sys.version_info[:2])
+if platform.python_implementation() != "CPython" or not (3, 10) <= sys.version_info[:2] <= (3, 14):
+    sys.exit("is " + version + ", need CPython 3.10 to 3.14")
+try:
+    import ensurepip, venv
+except ImportError as error:
+    sys.exit("is {} without {} (Debian, Ubuntu: apt install python3-venv)".format(version, error.name))
+' 2>&1) && {
             command -v "$candidate"
             return
-        fi
+        }
+        problems+="  $candidate: ${problem##*$'\n'}"$'\n'
     done
-    die "No CPython 3.10 to 3.12 with venv was found: install one (Debian: python3-venv) or name it with PYTHON=/path/to/python3."
+    die "No usable Python was found:
+${problems}Install CPython 3.10 to 3.14 with its venv module, or name one with PYTHON=/path/to/python3."
 }
 
 prepare_environment() {
@@ -36,7 +52,7 @@ prepare_environment() {
     if [ "$(cat "$stamp" 2>/dev/null)" != "$want" ]; then
         echo "Installing peace_ros[$extras] from PyPI (about a minute the first time) ..."
         "$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
-            --editable "$checkout[$extras]" >"$venv/install.log" 2>&1 || {
+            --editable "${checkout}[$extras]" >"$venv/install.log" 2>&1 || {
             tail -n 15 "$venv/install.log" >&2
             die "The packages could not be installed: see above and $venv/install.log; is PyPI reachable?"
         }

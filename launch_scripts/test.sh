@@ -2,23 +2,23 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# All checks of the project: style, types, import rules, unit tests, and a landing with the real
-# processes over DDS and MAVLink. Sets itself up; works on a fresh machine.
+# All checks of the project: style, types, import rules, unit tests with the site and the examples,
+# and landings with the real processes over DDS and MAVLink. Sets itself up on a fresh machine.
 #
 #   launch_scripts/test.sh               everything but the tests of training and export
 #   launch_scripts/test.sh --training    these too (installs torch)
-#   launch_scripts/test.sh --quick       without the landing
-#   anything else is handed to pytest, in place of what it is given otherwise
+#   launch_scripts/test.sh --quick       without the landings
+#   anything else goes to pytest, in place of its usual arguments
 set -euo pipefail
 # shellcheck source=launch_scripts/environment.sh
 source "$(dirname "${BASH_SOURCE[0]}")/environment.sh"
 
-extras=wheels,test
+extras=wheels,test,docs
 with_landing=yes
 pytest_arguments=()
 for argument in "$@"; do
     case $argument in
-    --training) extras=wheels,test,train,export ;;
+    --training) extras=wheels,test,docs,train,export ;;
     --quick) with_landing= ;;
     -h | --help)
         sed -n '5,12s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
@@ -34,6 +34,7 @@ cd "$checkout"
 echo '== style'
 ruff check .
 ruff format --check .
+shellcheck -x launch_scripts/*.sh .ci/run
 echo '== types'
 mypy
 echo '== import rules'

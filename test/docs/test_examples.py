@@ -1,0 +1,57 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every example is short, listed, and runs from an empty folder."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / 'docs/examples'
+EXAMPLES = sorted(path.name for path in FOLDER.glob('*.py'))
+SHOWN = {
+    'segment_image.py': '% of the image is called safe',
+    'rank_words.py': 'of grass',
+    'land_on_heatmaps.py': 'HANDOVER: ',
+    'judge_bag.py': 'state at the end: ',
+}
+"""What an example must have printed."""
+
+
+def _run(name: str, folder: Path, *arguments: str) -> str:
+    result = subprocess.run(
+        [sys.executable, FOLDER / name, *arguments],
+        cwd=folder,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+@pytest.mark.parametrize('name', EXAMPLES)
+def test_example_runs_from_an_empty_folder(name: str, tmp_path: Path) -> None:
+    printed = _run(name, tmp_path)
+    assert SHOWN.get(name, '\n') in printed
+
+
+@pytest.mark.parametrize('name', EXAMPLES)
+def test_example_is_short_and_listed(name: str) -> None:
+    assert len((FOLDER / name).read_text().splitlines()) <= 30
+    assert f']({name})' in (FOLDER / 'README.md').read_text()
+
+
+def test_examples_show_what_they_are_meant_to() -> None:
+    assert set(SHOWN) <= set(EXAMPLES)
+
+
+def test_image_example_takes_a_file(tmp_path: Path) -> None:
+    image = ROOT / 'docs/images/closer_looks.jpg'
+    assert 'of the image is called safe' in _run('segment_image.py', tmp_path, str(image))
+    assert (tmp_path / 'overlay.png').stat().st_size > 10_000
