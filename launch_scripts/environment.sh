@@ -14,14 +14,14 @@ die() {
 
 find_python() {
     local candidate
-    for candidate in ${PYTHON:-} python3.12 python3.11 python3.10 python3; do
+    for candidate in ${PYTHON:-} python3.12 python3.14 python3.13 python3.11 python3.10 python3; do
         if "$candidate" -c 'import sys, venv, ensurepip
-sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 12))' 2>/dev/null; then
+sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 14))' 2>/dev/null; then
             command -v "$candidate"
             return
         fi
     done
-    die "No CPython 3.10 to 3.12 with venv was found: install one (Debian: python3-venv) or name it with PYTHON=/path/to/python3."
+    die "No CPython 3.10 to 3.14 with venv was found: install one (Debian: python3-venv) or name it with PYTHON=/path/to/python3."
 }
 
 prepare_environment() {
