@@ -17,23 +17,31 @@ MARKER = Path('config/ament') / NAME
 # file from a build folder without them and finds them in the checkout instead.)
 SHIPPED = [folder for folder in ('config', 'models') if Path(__file__).with_name(folder).is_dir()]
 
+# Training runs in a checkout, where its annotations lie; an installed package has neither.
+LEFT_OUT = [f'{NAME}.lab.training', f'{NAME}.lab.training.*']
+DATA_LEFT_OUT = ['ament/*', 'annotations/*']
+
+# ROS looks for launch files and what they name under share/, for nothing else.
+SHARED = ('config/*.yaml', 'config/*.xml', 'config/presets/*.yaml')
+
 NODES = ('prompt_generator', 'segmentation', 'landing', 'satellite_view', 'autopilot_sim')
 
 
-def _share(folder: str) -> list[tuple[str, list[str]]]:
-    """List a folder's files for the share directory of the ament index."""
+def _share() -> list[tuple[str, list[str]]]:
+    """List the configuration for the share directory of the ament index."""
     files_of: dict[str, list[str]] = {}
-    for path in sorted((ROOT / folder).rglob('*')):
-        relative = path.relative_to(ROOT)
-        if path.is_file() and relative != MARKER:
+    for pattern in SHARED:
+        for path in sorted(ROOT.glob(pattern)):
+            relative = path.relative_to(ROOT)
             files_of.setdefault(f'share/{NAME}/{relative.parent}', []).append(str(relative))
     return sorted(files_of.items())
 
 
 setup(
     name=NAME,
+    python_requires='>=3.10',
     packages=[
-        *find_packages(include=[NAME, f'{NAME}.*']),
+        *find_packages(include=[NAME, f'{NAME}.*'], exclude=LEFT_OUT),
         *(f'{NAME}.{folder}' for folder in SHIPPED),
     ],
     package_dir={f'{NAME}.{folder}': folder for folder in SHIPPED},
@@ -41,11 +49,12 @@ setup(
         **{f'{NAME}.{folder}': ['**/*'] for folder in SHIPPED},
         f'{NAME}.lab.evaluation.segmentation': ['templates/*.j2'],
     },
+    exclude_package_data={f'{NAME}.config': DATA_LEFT_OUT} if SHIPPED else {},
     data_files=[
         ('share/ament_index/resource_index/packages', [str(MARKER)]),
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/launch', ['launch_scripts/landing.launch.py']),
-        *_share('config'),
+        *_share(),
     ],
     entry_points={
         'console_scripts': [

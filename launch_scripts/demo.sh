@@ -15,5 +15,5 @@ set -euo pipefail
 # shellcheck source=launch_scripts/environment.sh
 source "$(dirname "${BASH_SOURCE[0]}")/environment.sh"
 
-prepare_environment wheels
+prepare_environment wheels,simulation
 exec peace demo "$@"

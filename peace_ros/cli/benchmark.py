@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from peace_ros.cli.extras import require
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.inference import Bundle
 from peace_ros.core.inference.providers import CPU, available_providers, check_providers
@@ -81,6 +82,8 @@ def benchmark(
     """Time CLIPSeg and FastSAM frame by frame, beside the ways that others run them."""
     provider = provider or _fastest()
     check_providers((provider,))
+    if reference or fastsam or not (clipseg and clip):  # the reference, or random bundles
+        require('torch', 'transformers', 'onnx')
     if reference and bool(clipseg) != (source != _RANDOM):
         raise ConfigurationError(
             f'--clipseg {clipseg or "(random)"} with --source {source}: the reference must have '

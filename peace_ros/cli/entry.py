@@ -11,10 +11,13 @@ from __future__ import annotations
 import importlib
 import os
 import signal
+import sys
 from types import FrameType
 from typing import Any
 
-EXIT_INTERRUPTED = 130
+from peace_ros.cli.extras import how_to_install
+
+EXIT_REFUSED, EXIT_INTERRUPTED = 2, 130
 
 
 def _leave(_number: int, _frame: FrameType | None) -> None:
@@ -23,9 +26,18 @@ def _leave(_number: int, _frame: FrameType | None) -> None:
 
 
 def start(module: str) -> Any:
-    """Import a module and run its ``main``; an interrupt before that is exit status 130."""
+    """Import a module and run its ``main``.
+
+    An interrupt before that is exit status 130; a package that is missing is one sentence and 2.
+    """
     previous = signal.signal(signal.SIGINT, _leave)
-    main = importlib.import_module(module).main
+    try:
+        main = importlib.import_module(module).main
+    except ModuleNotFoundError as error:
+        if (sentence := how_to_install(error)) is None:
+            raise
+        print(f'{module}: {sentence}', file=sys.stderr)
+        sys.exit(EXIT_REFUSED)
     signal.signal(signal.SIGINT, previous)
     return main()
 

@@ -16,6 +16,7 @@ from typing import Annotated
 import typer
 
 from peace_ros import __version__
+from peace_ros.cli.extras import how_to_install
 from peace_ros.core.domain import (
     BundleError,
     ConfigurationError,
@@ -78,9 +79,10 @@ def _add(to: typer.Typer, name: str, summary: str, module: str, function: str) -
 
 @contextmanager
 def _in_one_sentence() -> Iterator[None]:
-    """Turn a PeaceError into one sentence on standard error and an exit status.
+    """Turn an error into one sentence on standard error and an exit status.
 
-    2 for what the user gave and can change, 1 for what failed on the way.
+    2 for what the user gave and can change, 1 for what failed on the way. A defect keeps its
+    traceback.
     """
     try:
         yield
@@ -89,6 +91,11 @@ def _in_one_sentence() -> Iterator[None]:
         refused = (ConfigurationError, BundleError, RecordingError, WorldError)
         status = EXIT_REFUSED if isinstance(error, refused) else EXIT_FAILED
         raise typer.Exit(status) from None
+    except ModuleNotFoundError as error:
+        if (sentence := how_to_install(error)) is None:
+            raise
+        typer.echo(f'peace: {sentence}', err=True)
+        raise typer.Exit(EXIT_REFUSED) from None
     except KeyboardInterrupt:
         typer.echo('peace: interrupted', err=True)
         raise typer.Exit(EXIT_INTERRUPTED) from None

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TimeRemainingColumn
 
+from peace_ros.cli.extras import require
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.inference.bundle import user_models_dir
 from peace_ros.core.inference.manifest import PRECISIONS
@@ -100,7 +100,7 @@ def models_export(
             f'{source}: FastSAM needs a CLIP to score its segments: export one and name its '
             'bundle, --clip BUNDLE'
         )
-    _require(_NEEDED)
+    require(*_NEEDED)
     from peace_ros.lab.export.build import build_bundle
     from peace_ros.lab.export.pictures import read_pictures
     from peace_ros.lab.export.sources import load_source
@@ -124,7 +124,7 @@ def _export_fastsam(
     images: Path | None,
     side_px: int,
 ) -> None:
-    _require(('onnx',) if source.suffix == '.onnx' else ('torch', 'onnx'))
+    require(*(('onnx',) if source.suffix == '.onnx' else ('onnx', 'torch')))
     from peace_ros.core.inference.bundle import Bundle
     from peace_ros.lab.export.fastsam import export_fastsam
     from peace_ros.lab.export.pictures import read_pictures
@@ -140,14 +140,6 @@ def _export_fastsam(
         frames=read_pictures(images) if images else None,
     )
     typer.echo(f'{folder}: agrees with its reference: {agreement}')
-
-
-def _require(packages: tuple[str, ...]) -> None:
-    missing = [each for each in packages if importlib.util.find_spec(each) is None]
-    if missing:
-        raise ConfigurationError(
-            f'export needs {", ".join(missing)}: run pip install -e ".[export]" in the checkout'
-        )
 
 
 def models_fetch(

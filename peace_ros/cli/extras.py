@@ -1,0 +1,68 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What to install when a package is missing: one sentence with the command.
+
+Imports nothing that could be missing itself.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+EXTRA_OF = {
+    'rosbags': 'simulation',
+    'tifffile': 'geo',
+    'openvino': 'openvino',
+    'serial': 'serial',
+    'torch': 'export',
+    'transformers': 'export',
+    'safetensors': 'export',
+    'onnx': 'export',
+    'PIL': 'export',
+}
+"""Module -> the extra of setup.cfg that installs its package."""
+PACKAGE_OF = {
+    'cv2': 'opencv-python-headless',
+    'yaml': 'PyYAML',
+    'PIL': 'pillow',
+    'serial': 'pyserial',
+}
+"""Module -> its package on PyPI, where the names differ."""
+ROS_MODULES = frozenset(
+    {'rclpy', 'launch', 'launch_ros', 'ament_index_python', 'std_srvs', 'tf2_ros', 'tf2_msgs'}
+    | {f'{name}_msgs' for name in ('sensor', 'std', 'geometry', 'diagnostic', 'rosgraph')}
+    | {f'{name}_interfaces' for name in ('rcl', 'builtin')}
+)
+
+
+def how_to_install(error: ModuleNotFoundError) -> str | None:
+    """Return the sentence about a package that is not installed.
+
+    Returns:
+        None: A module of this package is missing, which no command mends.
+    """
+    module = (error.name or '').partition('.')[0]
+    if module in {'', 'peace_ros'}:
+        return None
+    package = PACKAGE_OF.get(module, module)
+    if module in ROS_MODULES:
+        command = (
+            'source the setup file of ROS 2 Jazzy (on x86_64 without ROS: run '
+            'pip install ".[wheels]" in the checkout)'
+        )
+    elif module in EXTRA_OF:
+        command = f'run pip install ".[{EXTRA_OF[module]}]" in the checkout'
+    else:
+        command = f'run pip install {package}'
+    return f'the package {package} is not installed: {command}'
+
+
+def require(*modules: str) -> None:
+    """Check, without importing them, that modules are there.
+
+    Raises:
+        ModuleNotFoundError: The first that is missing; `how_to_install` turns it into a sentence.
+    """
+    for module in modules:
+        if find_spec(module) is None:
+            raise ModuleNotFoundError(f'No module named {module!r}', name=module)
