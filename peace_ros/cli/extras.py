@@ -11,7 +11,11 @@ from importlib.util import find_spec
 
 EXTRA_OF = {
     'rosbags': 'simulation',
-    'tifffile': 'geo',
+    'rasterio': 'geo',
+    'jinja2': 'lab',
+    'matplotlib': 'lab',
+    'pooch': 'fetch',
+    'requests': 'fetch',
     'openvino': 'openvino',
     'serial': 'serial',
     'torch': 'export',
