@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``peace models``: look at bundles, make them, fetch them."""
+"""``peace models``: list, check, export and download bundles."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def models_list() -> None:
     from peace_ros.core.resources import models_dir
 
     for place in dict.fromkeys((models_dir(), user_models_dir())):
-        # What is under way or set aside begins with a dot.
+        # Names of unfinished and replaced bundles begin with a dot.
         for path in sorted(place.glob(f'[!.]*/{MANIFEST_NAME}')):
             try:
                 manifest = parse_manifest(path.read_bytes(), str(path))
@@ -152,7 +152,7 @@ def models_fetch(
         Path | None, typer.Option(metavar='DIR', help="Folder of bundles; none: the user's own.")
     ] = None,
 ) -> None:
-    """Download a bundle by name; an interrupted download goes on where it stopped."""
+    """Download a bundle by name; an interrupted download continues where it stopped."""
     from peace_ros.lab.export.fetch import fetch_bundle
 
     if not index:

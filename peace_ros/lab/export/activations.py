@@ -4,15 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+from peace_ros.lab.export.precision import Scale
 
 _ROWS_PER_RUN = 64
 """Of what enters a product, per sample; on these, scales are tried."""
@@ -20,20 +20,6 @@ _TIGHTER = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.5)
 """Shares of the range that are tried: cutting off a few far values makes the step finer."""
 _LEAST = 1e-6
 """Of a range: what is always zero gets a scale too."""
-
-
-@dataclass(frozen=True)
-class Scale:
-    """``real = integer * step``: a zero point elsewhere costs OpenVINO more than it gains."""
-
-    step: float
-    is_unsigned: bool
-    """uint8, 0 to 255, for what follows a ReLU; else int8, -127 to 127."""
-
-    @property
-    def limits(self) -> tuple[int, int]:
-        """The least and the largest integer."""
-        return (0, 255) if self.is_unsigned else (-127, 127)
 
 
 @dataclass

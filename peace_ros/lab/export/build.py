@@ -1,31 +1,22 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Source -> verified bundle, put in place in one step or not at all."""
+"""Source -> verified bundle, put in place complete or not at all."""
 
 from __future__ import annotations
 
-import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from peace_ros.core.domain import BundleError
-from peace_ros.core.inference.bundle import MANIFEST_NAME, Bundle, file_entry
-from peace_ros.core.inference.manifest import FORMAT, PRECISIONS, ROLES_BY_FAMILY
+from peace_ros.core.domain import BundleError, Frame
+from peace_ros.core.inference.bundle import Bundle
+from peace_ros.core.inference.manifest import PRECISIONS
 from peace_ros.core.inference.tokenizer import Tokenizer
 from peace_ros.lab.export import graphs, pictures
 from peace_ros.lab.export.precision import to_fp16
 from peace_ros.lab.export.quantiser import Quantiser
-from peace_ros.lab.export.staging import staged
-from peace_ros.lab.export.verify import Agreement, compare
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from peace_ros.core.domain import Frame
-    from peace_ros.lab.export.sources import ModelSource
-
-_WRITERS = {'clip': graphs.write_clip_graphs, 'clipseg': graphs.write_clipseg_graphs}
-_THRESHOLD = {'threshold': 0.5}
+from peace_ros.lab.export.sources import ModelSource
+from peace_ros.lab.export.staging import change_manifest, staged, write_manifest
+from peace_ros.lab.export.verify import ModelAgreement, compare
 
 
 def build_bundle(
@@ -35,14 +26,14 @@ def build_bundle(
     precision: str = 'fp32',
     frames: Sequence[Frame] | None = None,
     licence: str = 'that of the source',
-) -> Agreement:
+) -> ModelAgreement:
     """Export, verify and put in place.
 
     Args:
         source: the reference model.
-        folder: the bundle; an older one there stays until the new one has been verified.
-        precision: ``fp32``, ``fp16`` or ``int8`` (for CPUs; the text encoder stays fp32, it never
-            runs on a frame's path).
+        folder: of the bundle; an older one there stays until the new one has been verified.
+        precision: ``fp32``, ``fp16`` or ``int8`` (for CPUs; the text encoder stays fp32, since it
+            does not run for every frame).
         frames: images to verify on; None: drawn ones. For int8 most of them are measured to find
             scales, and it is verified on the others.
         licence: of the weights, as the manifest will say.
@@ -61,7 +52,7 @@ def build_bundle(
         _fill(stage, source, folder.name, precision, measured, 'checked', licence)
         agreement = compare(source, Bundle.load(stage), frames)
         agreement.refuse_if_poor(precision, source.name)
-        _note_agreement(stage / MANIFEST_NAME, agreement)
+        change_manifest(stage, verification=agreement.as_numbers())
     return agreement
 
 
@@ -77,27 +68,16 @@ def build_unchecked(
 
 
 def _fill(
-    stage: Path,
-    source: ModelSource,
-    name: str,
-    precision: str,
-    frames: Sequence[Frame],
-    done: str,
-    licence: str,
-) -> None:
+    stage: Path, source: ModelSource, name: str, precision: str, frames: Sequence[Frame],
+    done: str, licence: str,
+) -> None:  # fmt: skip
     if precision not in PRECISIONS:
         raise BundleError(f'precision {precision!r}: choose one of {", ".join(PRECISIONS)}')
     source.vocabulary.write(stage / 'tokenizer.json', source.context_length)
-    _write_graphs(source, stage, precision, frames)
-    _write_manifest(source, stage, name, precision, done, licence)
-
-
-def _write_graphs(
-    source: ModelSource, stage: Path, precision: str, frames: Sequence[Frame]
-) -> None:
     tokens = Tokenizer(stage / 'tokenizer.json', source.context_length)(pictures.TEXTS)
     quantiser = Quantiser(source, frames, tokens) if precision == 'int8' else None
-    _WRITERS[source.family](
+    write = graphs.write_clip_graphs if source.family == 'clip' else graphs.write_clipseg_graphs
+    write(
         source.model,
         stage,
         side_px=source.input.height,
@@ -109,42 +89,15 @@ def _write_graphs(
     elif precision == 'fp16':
         for file in sorted(stage.glob('*.onnx')):
             to_fp16(file)
-
-
-def _write_manifest(
-    source: ModelSource, stage: Path, name: str, precision: str, done: str, licence: str
-) -> None:
-    roles = {
-        role: 'tokenizer.json' if role == 'tokenizer' else f'{role}.onnx'
-        for role in ROLES_BY_FAMILY[source.family]
-    }
-    spec = source.input
-    manifest: dict[str, Any] = {
-        'format': FORMAT,
-        'name': name,
-        'family': source.family,
-        'roles': roles,
-        'input': {
-            'width': spec.width,
-            'height': spec.height,
-            'resize': spec.resize,
-            'interpolation': spec.interpolation,
-            'mean': list(spec.mean),
-            'std': list(spec.std),
-        },
-        'embedding_width': source.embedding_width,
-        'context_length': source.context_length,
-        'precision': precision,
-        'files': {file: file_entry(stage / file) for file in roles.values()},
-        'licence': licence,
-        'provenance': f'exported from {source.name} and {done} against it',
-        'recommended': _THRESHOLD if source.family == 'clipseg' else {},
-    }
-    text = json.dumps(manifest, indent=2) + '\n'
-    (stage / MANIFEST_NAME).write_text(text, encoding='utf-8')
-
-
-def _note_agreement(manifest: Path, agreement: Agreement) -> None:
-    values = json.loads(manifest.read_text(encoding='utf-8'))
-    values['verification'] = agreement.as_numbers()
-    manifest.write_text(json.dumps(values, indent=2) + '\n', encoding='utf-8')
+    write_manifest(
+        stage,
+        name,
+        source.family,
+        {'input': source.input},
+        embedding_width=source.embedding_width,
+        context_length=source.context_length,
+        precision=precision,
+        licence=licence,
+        provenance=f'exported from {source.name} and {done} against it',
+        recommended={'threshold': 0.5} if source.family == 'clipseg' else {},
+    )

@@ -12,17 +12,9 @@ from typing import Any
 import numpy as np
 import onnx
 from numpy.typing import NDArray
-from onnxruntime.quantization import (
-    CalibrationDataReader,
-    QuantFormat,
-    QuantType,
-    quantize_static,
-)
+from onnxruntime.quantization import CalibrationDataReader, QuantFormat, QuantType, quantize_static
 
 from peace_ros.core.domain import BundleError
-
-_MOST_WORDS = logging.ERROR
-"""The quantiser recommends a preparation that changes nothing here."""
 
 
 class _Samples(CalibrationDataReader):  # type: ignore[misc]
@@ -37,7 +29,7 @@ def to_int8_convolutions(path: Path, samples: Iterable[NDArray[np.float32]]) -> 
     """Rewrite a graph: the convolutions inside it in int8, static, one scale per channel.
 
     The first one sees single colours and the last ones say boxes, confidences and coefficients;
-    those stay fp32, and so does all that is no convolution.
+    those stay fp32, as everything else does.
 
     Args:
         path: a graph with one input.
@@ -52,9 +44,8 @@ def to_int8_convolutions(path: Path, samples: Iterable[NDArray[np.float32]]) -> 
         raise BundleError(f'{path}: no convolution to write in int8; export it in fp32')
     source = path.with_suffix('.fp32.onnx')
     path.rename(source)
-    root = logging.getLogger()
-    level = root.level
-    root.setLevel(_MOST_WORDS)
+    # The quantiser recommends a preparation that changes nothing here.
+    logging.disable(logging.WARNING)
     try:
         quantize_static(
             str(source),
@@ -68,7 +59,7 @@ def to_int8_convolutions(path: Path, samples: Iterable[NDArray[np.float32]]) -> 
             nodes_to_quantize=inner,
         )
     finally:
-        root.setLevel(level)
+        logging.disable(logging.NOTSET)
         source.unlink(missing_ok=True)
 
 

@@ -4,45 +4,42 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 import shutil
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
 
 import numpy as np
 import onnx
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import BundleError, ConfigurationError, Frame
-from peace_ros.core.inference.bundle import MANIFEST_NAME, Bundle, file_entry
+from peace_ros.core.inference.bundle import Bundle
 from peace_ros.core.inference.contract import IMAGE_EMBEDDING, PIXEL_VALUES, PREDICTIONS, PROTOTYPES
-from peace_ros.core.inference.manifest import FORMAT, PRECISIONS
+from peace_ros.core.inference.manifest import PRECISIONS, InputSpec
 from peace_ros.core.inference.session import Session, open_sessions
+from peace_ros.lab.export.agreement import Agreement, cosine, mask_iou
 from peace_ros.lab.export.batching import free_batch
 from peace_ros.lab.export.convolutions import to_int8_convolutions
 from peace_ros.lab.export.pictures import divide_pictures, draw_pictures, plain_pixels
 from peace_ros.lab.export.precision import require_finite, to_fp16
 from peace_ros.lab.export.segmenters import Outputs, SegmenterSource, load_segmenter
-from peace_ros.lab.export.staging import staged
+from peace_ros.lab.export.staging import change_manifest, staged, write_manifest
 
 _LOG = logging.getLogger(__name__)
 
 MOST_BOX_ERROR_PX = 0.01
 MOST_ERROR = 1e-3
-"""Of confidences, coefficients and prototypes, against the reference, fp32."""
-LEAST_COSINE = 0.999
-LEAST_IOU = 0.98
-"""Of the surest masks; both for fp16 and int8, as for the other families."""
+"""Of confidences, coefficients and prototypes, in fp32."""
 _SUREST = 50
 _CHECKED_BATCH = 3
 
 
 @dataclass(frozen=True)
-class SegmenterAgreement:
+class SegmenterAgreement(Agreement):
     """How well a segmenter and its reference agree; the worst over all images."""
 
     box_error_px: float
@@ -51,29 +48,9 @@ class SegmenterAgreement:
     cosine: float
     """The least of those of boxes, confidences, coefficients and prototypes."""
     iou: float
-    """Of the surest masks of the reference, at the same anchors and taken together."""
+    """Of the most confident masks of the reference, at the same anchors, taken together."""
 
-    def refuse_if_poor(self, precision: str, what: str) -> None:
-        """Raise BundleError when the bundle must not be used."""
-        if precision == 'fp32':
-            is_good = self.box_error_px <= MOST_BOX_ERROR_PX and self.error <= MOST_ERROR
-            limit = f'{MOST_BOX_ERROR_PX} px and {MOST_ERROR} are allowed'
-            remedy = 'export with other versions of torch and ultralytics'
-        else:
-            is_good = self.cosine >= LEAST_COSINE and self.iou >= LEAST_IOU
-            limit = f'a cosine of {LEAST_COSINE} and an IoU of {LEAST_IOU} are needed'
-            remedy = 'choose a higher precision, or more pictures like those of the flight'
-        if not is_good:
-            raise BundleError(
-                f'{what} in {precision} does not agree with its reference: {self}; {limit}. '
-                f'Nothing was written; {remedy}'
-            )
-
-    def __str__(self) -> str:
-        return (
-            f'boxes differ by {self.box_error_px:.2g} px and the rest by {self.error:.2g} at most, '
-            f'cosine {self.cosine:.5f}, mask IoU {self.iou:.4f}'
-        )
+    MOST = MappingProxyType({'box_error_px': MOST_BOX_ERROR_PX, 'error': MOST_ERROR})
 
 
 def export_fastsam(
@@ -85,12 +62,12 @@ def export_fastsam(
     precision: str = 'fp32',
     frames: Sequence[Frame] | None = None,
 ) -> SegmenterAgreement:
-    """Write a fastsam bundle, hold it against the reference, and only then put it in its place.
+    """Write a fastsam bundle, compare it with the reference, and only then put it in place.
 
     Args:
         source: FastSAM-s.pt, FastSAM-x.pt or an exported graph, see :func:`load_segmenter`.
         clip: bundle of the family clip; its own precision stays.
-        folder: where the bundle goes; one that is there stays until the new one is verified.
+        folder: where the bundle goes; an older one there stays until the new one is verified.
         side_px: of the input, for a source that is a file.
         precision: of the segmenter: fp32, fp16 (GPU) or int8 (CPU).
         frames: images to verify on; None: drawn ones. For int8 most of them are measured to find
@@ -102,7 +79,7 @@ def export_fastsam(
     Raises:
         ConfigurationError: the precision or side is unknown, or ultralytics is missing.
         BundleError: source, CLIP bundle or folder cannot be used, or the exported network answers
-            otherwise than its reference. Nothing changes then.
+            differently from its reference. Nothing changes then.
     """
     if precision not in PRECISIONS:
         raise ConfigurationError(f'precision {precision!r}: choose one of {", ".join(PRECISIONS)}')
@@ -123,17 +100,34 @@ def export_fastsam(
         for role in ('text_encoder', 'tokenizer'):
             path = clip.paths[role]
             shutil.copyfile(path, stage / f'{role}{path.suffix}')
-        _write_manifest(stage, folder.name, clip, segmenter, precision)
+        of_clip = clip.manifest
+        crops = replace(of_clip.input, resize='letterbox', interpolation='area')
+        side = segmenter.side_px
+        whole = InputSpec(side, side, 'letterbox', (0.0,) * 3, (1.0,) * 3)
+        write_manifest(
+            stage,
+            folder.name,
+            'fastsam',
+            {'input': whole, 'crop_input': crops},
+            logit_scale=of_clip.logit_scale,
+            embedding_width=of_clip.embedding_width,
+            context_length=of_clip.context_length,
+            precision=precision,
+            licence=f'{segmenter.licence}; {of_clip.licence} (CLIP)',
+            provenance=f'{segmenter.provenance} in {precision}; CLIP in {of_clip.precision}: '
+            f'{of_clip.name}, {of_clip.provenance}',
+            recommended={},
+        )
         agreement = verify_segmenter(Bundle.load(stage), segmenter, images)
         agreement.refuse_if_poor(precision, segmenter.name)
-        _note_agreement(stage / MANIFEST_NAME, agreement)
+        change_manifest(stage, verification=agreement.as_numbers())
     return agreement
 
 
 def verify_segmenter(
     bundle: Bundle, source: SegmenterSource, images: Sequence[NDArray[np.float32]]
 ) -> SegmenterAgreement:
-    """Hold the bundle's graphs against the contract and its segmenter against the reference.
+    """Compare the bundle's graphs with the contract and its segmenter with the reference.
 
     Raises BundleError for graphs that do not fit.
     """
@@ -164,22 +158,15 @@ def _compare(have: Outputs, wanted: Outputs, side_px: int) -> SegmenterAgreement
     return SegmenterAgreement(
         errors[0],
         max(errors[1:]),
-        min(_cosine(ours, theirs) for ours, theirs in pairs),
-        _mask_iou(have, wanted, side_px),
+        min(cosine(ours, theirs) for ours, theirs in pairs),
+        _surest_iou(have, wanted, side_px),
     )
 
 
-def _cosine(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
-    flat, other = a.ravel().astype(np.float64), b.ravel().astype(np.float64)
-    return float(flat @ other / max(np.linalg.norm(flat) * np.linalg.norm(other), 1e-12))
-
-
-def _mask_iou(have: Outputs, wanted: Outputs, side_px: int) -> float:
-    """Return the IoU of the surest masks of the reference, taken together, in prototype cells."""
+def _surest_iou(have: Outputs, wanted: Outputs, side_px: int) -> float:
+    """Return the IoU of the reference's most confident masks together, in prototype cells."""
     surest = np.argsort(-wanted[0][0, 4])[:_SUREST]
-    ours, theirs = (_masks(each, surest, side_px) for each in (have, wanted))
-    union = np.count_nonzero(ours | theirs)
-    return float(np.count_nonzero(ours & theirs) / union) if union else 1.0
+    return mask_iou(*(_masks(each, surest, side_px) for each in (have, wanted)))
 
 
 def _masks(outputs: Outputs, anchors: NDArray[np.intp], side_px: int) -> NDArray[np.bool_]:
@@ -195,16 +182,10 @@ def _masks(outputs: Outputs, anchors: NDArray[np.intp], side_px: int) -> NDArray
     return inside
 
 
-def _note_agreement(manifest: Path, agreement: SegmenterAgreement) -> None:
-    values = json.loads(manifest.read_text(encoding='utf-8'))
-    values['verification'] = asdict(agreement)
-    manifest.write_text(json.dumps(values, indent=2) + '\n', encoding='utf-8')
-
-
 def _write_image_encoder(clip: Bundle, path: Path) -> None:
     """Write the CLIP bundle's image encoder, for any number of images.
 
-    Raises BundleError when it does not give them what it gives single ones.
+    Raises BundleError when it answers differently for several images than for single ones.
     """
     source = clip.paths['image_encoder']
     model = onnx.load(str(source))
@@ -227,50 +208,11 @@ def _write_image_encoder(clip: Bundle, path: Path) -> None:
     single_ones = np.concatenate(wanted)
     lengths = np.linalg.norm(single_ones, axis=1)
     error_of_unit = float((np.linalg.norm(have - single_ones, axis=1) / lengths).max())
-    # Sums in another order end on other integers: int8 and fp16 are held to what they are
-    # elsewhere.
+    # Sums in another order round to other integers: int8 and fp16 have their usual limit.
     exact = clip.manifest.precision == 'fp32'
-    most = MOST_ERROR if exact else math.sqrt(2.0 - 2.0 * LEAST_COSINE)
+    most = MOST_ERROR if exact else math.sqrt(2.0 - 2.0 * Agreement.LEAST['cosine'])
     if not error_of_unit <= most:
         raise BundleError(
             f'{source}: embeddings of several images differ by {error_of_unit:.2g} from those of '
             f'single ones where {most:.2g} is allowed; {remedy}'
         )
-
-
-def _write_manifest(
-    stage: Path, name: str, clip: Bundle, segmenter: SegmenterSource, precision: str
-) -> None:
-    manifest = clip.manifest
-    files = {path.name: file_entry(path) for path in sorted(stage.iterdir())}
-    square: dict[str, Any] = {
-        'width': segmenter.side_px,
-        'height': segmenter.side_px,
-        'resize': 'letterbox',
-    }
-    values = {
-        'format': FORMAT,
-        'name': name,
-        'family': 'fastsam',
-        'roles': {Path(file).stem: file for file in files},
-        'input': square | {'mean': [0.0, 0.0, 0.0], 'std': [1.0, 1.0, 1.0]},
-        'crop_input': {
-            'width': manifest.input.width,
-            'height': manifest.input.height,
-            'resize': 'letterbox',
-            'mean': list(manifest.input.mean),
-            'std': list(manifest.input.std),
-        },
-        'logit_scale': manifest.logit_scale,
-        'embedding_width': manifest.embedding_width,
-        'context_length': manifest.context_length,
-        'precision': precision,
-        'files': files,
-        'licence': f'{segmenter.licence}; {manifest.licence} (CLIP)',
-        'provenance': (
-            f'{segmenter.provenance} in {precision}; CLIP in {manifest.precision}: '
-            f'{manifest.name}, {manifest.provenance}'
-        ),
-        'recommended': {},
-    }
-    (stage / MANIFEST_NAME).write_text(json.dumps(values, indent=2) + '\n', encoding='utf-8')

@@ -8,9 +8,10 @@ import json
 import logging
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 from urllib.parse import urljoin, urlsplit
 from urllib.request import url2pathname
 
@@ -18,11 +19,8 @@ from peace_ros.core.domain import BundleError
 from peace_ros.core.inference.bundle import MANIFEST_NAME, Bundle, put_in_place
 from peace_ros.core.inference.manifest import parse_manifest
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    Progress = Callable[[str, int, int], None]
-    """Takes file, bytes so far and bytes in all."""
+Progress = Callable[[str, int, int], None]
+"""Takes file, bytes so far and bytes in all."""
 
 _CHUNK_BYTES = 1 << 18
 _MOST_JSON_BYTES = 1 << 20
@@ -101,8 +99,9 @@ def _retrieve(
         raise BundleError(f'{url}: give a URL that begins with {", ".join(_SCHEMES)}')
     pooch.get_logger().setLevel(logging.WARNING)
     try:
+        known = None if sha256 is None else f'sha256:{sha256}'
         download = _Download(path, most_bytes, progress)
-        pooch.retrieve(url, sha256, path.name, path.parent, downloader=download)
+        pooch.retrieve(url, known, path.name, path.parent, downloader=download)
     except ValueError as error:
         raise BundleError(
             f'{url}: its SHA-256 is not the announced {sha256}; it was removed, call again or ask '

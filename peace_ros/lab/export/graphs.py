@@ -5,31 +5,18 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 
-from peace_ros.core.inference.contract import (
-    ATTENTION_MASK,
-    IMAGE_EMBEDDING,
-    INPUT_IDS,
-    IS_POSITIVE,
-    NEGATIVE,
-    PIXEL_VALUES,
-    POSITIVE,
-    SOFTMAX_POSITIVE,
-    TERM_LOGITS,
-    TEXT_EMBEDDING,
-)
+from peace_ros.core.inference import contract
 from peace_ros.lab.export.decoder import ClipSegDecoderGraph
 from peace_ros.lab.export.towers import ClipImageTower, ClipSegImageTower, TextTower
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
-
-    Prepare = Callable[[str, nn.Module], nn.Module]
+Prepare = Callable[[str, nn.Module], nn.Module]
 
 OPSET = 17
 """The first with LayerNormalization, which keeps fp16 from collapsing."""
@@ -50,12 +37,12 @@ def write_clip_graphs(
 
     ``prepare`` takes a role and its tower and returns the tower to write instead.
     """
-    _write(
+    write_graph(
         prepare('image_encoder', ClipImageTower(reference, side_px)),
         (torch.zeros(1, 3, side_px, side_px),),
         folder / 'image_encoder.onnx',
-        (PIXEL_VALUES,),
-        (IMAGE_EMBEDDING,),
+        (contract.PIXEL_VALUES,),
+        (contract.IMAGE_EMBEDDING,),
     )
     _write_text(TextTower(reference, end_of_text), folder)
 
@@ -71,34 +58,42 @@ def write_clipseg_graphs(
     names = tuple(f'layer_{layer}' for layer in tower.trunk.read_after)
     pixels = torch.zeros(1, 3, side_px, side_px)
     encoder = prepare('image_encoder', tower)
-    _write(encoder, (pixels,), folder / 'image_encoder.onnx', (PIXEL_VALUES,), names)
+    write_graph(encoder, (pixels,), folder / 'image_encoder.onnx', (contract.PIXEL_VALUES,), names)
     _write_text(TextTower(reference.clip, end_of_text), folder)
     with torch.no_grad():
         features = tower(pixels)
     width = int(reference.config.projection_dim)
-    _write(
+    write_graph(
         prepare('decoder', ClipSegDecoderGraph(reference, tower.rows)),
         (*features, torch.zeros(3, width), torch.tensor([1.0, 1.0, 0.0])),
         folder / 'decoder.onnx',
-        (*names, TEXT_EMBEDDING, IS_POSITIVE),
-        (POSITIVE, NEGATIVE, SOFTMAX_POSITIVE, TERM_LOGITS),
-        {TEXT_EMBEDDING: _PER_TERM, IS_POSITIVE: _PER_TERM, TERM_LOGITS: _PER_TERM},
+        (*names, contract.TEXT_EMBEDDING, contract.IS_POSITIVE),
+        (contract.POSITIVE, contract.NEGATIVE, contract.SOFTMAX_POSITIVE, contract.TERM_LOGITS),
+        {
+            contract.TEXT_EMBEDDING: _PER_TERM,
+            contract.IS_POSITIVE: _PER_TERM,
+            contract.TERM_LOGITS: _PER_TERM,
+        },
     )
 
 
 def _write_text(tower: TextTower, folder: Path) -> None:
     ids = torch.full((2, 5), tower.end_of_text)
-    _write(
+    write_graph(
         tower,
         (ids, torch.ones_like(ids)),
         folder / 'text_encoder.onnx',
-        (INPUT_IDS, ATTENTION_MASK),
-        (TEXT_EMBEDDING,),
-        {INPUT_IDS: _BATCH_AND_LENGTH, ATTENTION_MASK: _BATCH_AND_LENGTH, TEXT_EMBEDDING: {0: 'B'}},
+        (contract.INPUT_IDS, contract.ATTENTION_MASK),
+        (contract.TEXT_EMBEDDING,),
+        {
+            contract.INPUT_IDS: _BATCH_AND_LENGTH,
+            contract.ATTENTION_MASK: _BATCH_AND_LENGTH,
+            contract.TEXT_EMBEDDING: {0: 'B'},
+        },
     )
 
 
-def _write(
+def write_graph(
     module: nn.Module,
     inputs: tuple[Tensor, ...],
     path: Path,
@@ -106,6 +101,10 @@ def _write(
     output_names: Sequence[str],
     dynamic_axes: Mapping[str, Mapping[int, str]] | None = None,
 ) -> None:
+    """Write a module in evaluation mode as an ONNX graph.
+
+    ``dynamic_axes`` names the axes that may change, by input or output.
+    """
     with torch.no_grad(), warnings.catch_warnings():
         # The newer exporter of torch needs one more package and names the axes its own way.
         warnings.simplefilter('ignore')

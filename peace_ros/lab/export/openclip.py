@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 import json
-import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
 from safetensors.torch import load_file
@@ -15,9 +15,6 @@ from torch import Tensor
 from transformers import CLIPConfig, CLIPModel
 
 from peace_ros.core.domain import BundleError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _CONFIG = 'open_clip_config.json'
 _WEIGHTS = (
@@ -29,26 +26,29 @@ SUFFIXES = ('.pt', '.pth', '.bin', '.safetensors')
 _HEAD_WIDTH = 64
 """Of every vision and text tower that OpenAI and OpenCLIP call ViT-B or ViT-L."""
 
-_NAMES = {
-    'visual.class_embedding': 'vision_model.embeddings.class_embedding',
-    'visual.conv1.weight': 'vision_model.embeddings.patch_embedding.weight',
-    'visual.positional_embedding': 'vision_model.embeddings.position_embedding.weight',
-    'visual.ln_pre': 'vision_model.pre_layrnorm',
-    'visual.ln_post': 'vision_model.post_layernorm',
-    'token_embedding.weight': 'text_model.embeddings.token_embedding.weight',
-    'positional_embedding': 'text_model.embeddings.position_embedding.weight',
-    'ln_final': 'text_model.final_layer_norm',
-    'logit_scale': 'logit_scale',
-}
-_LAYER_NAMES = {
-    'attn.out_proj': 'self_attn.out_proj',
-    'ln_1': 'layer_norm1',
-    'ln_2': 'layer_norm2',
-    'mlp.c_fc': 'mlp.fc1',
-    'mlp.c_proj': 'mlp.fc2',
-}
+_RENAMES = (
+    ('visual.transformer.resblocks', 'vision_model.encoder.layers'),
+    ('transformer.resblocks', 'text_model.encoder.layers'),
+    ('.attn.', '.self_attn.'),
+    ('.ln_1', '.layer_norm1'),
+    ('.ln_2', '.layer_norm2'),
+    ('.c_fc', '.fc1'),
+    ('.c_proj', '.fc2'),
+    ('visual.class_embedding', 'vision_model.embeddings.class_embedding'),
+    ('visual.conv1', 'vision_model.embeddings.patch_embedding'),
+    ('visual.positional_embedding', 'vision_model.embeddings.position_embedding.weight'),
+    ('visual.ln_pre', 'vision_model.pre_layrnorm'),
+    ('visual.ln_post', 'vision_model.post_layernorm'),
+    ('visual.proj', 'visual_projection.weight'),
+    ('token_embedding', 'text_model.embeddings.token_embedding'),
+    ('positional_embedding', 'text_model.embeddings.position_embedding.weight'),
+    ('ln_final', 'text_model.final_layer_norm'),
+    ('text_projection', 'text_projection.weight'),
+)
+"""Parts of names in these checkpoints and in transformers, replaced in this order."""
+_TRANSPOSED = ('visual_projection.weight', 'text_projection.weight')
+_SIZES = ('input_resolution', 'context_length', 'vocab_size', 'attn_mask')
 _HUGGING_FACE = ('text_model.', 'vision_model.', 'clip.', 'visual_projection', 'logit_bias')
-_LAYER = re.compile(r'(visual\.)?transformer\.resblocks\.(\d+)\.(.+)')
 
 
 def is_openclip(path: Path) -> bool:
@@ -111,7 +111,7 @@ def _read(file: Path) -> tuple[Mapping[str, Tensor], bool]:
         except RuntimeError:
             state = torch.load(str(file), map_location='cpu', weights_only=True)
     except Exception as error:  # pickle, zip and safetensors have no common base
-        # What torch says goes on for lines, and tells people to let the file run code.
+        # The message of torch has many lines and advises to let the file run code.
         raise BundleError(
             f'{file}: not a readable checkpoint ({file.stat().st_size} bytes, cut short or more '
             'than weights); download it again, or give a CLIP checkpoint'
@@ -127,46 +127,24 @@ def _read(file: Path) -> tuple[Mapping[str, Tensor], bool]:
 
 
 def _translate(state: Mapping[str, Tensor], path: Path) -> dict[str, Tensor]:
+    """Return the weights under the names of transformers."""
+    if any(key.startswith(_HUGGING_FACE) for key in state):
+        raise BundleError(
+            f'{path}: its weights have the names of save_pretrained; give the folder that holds it '
+            'and its config.json'
+        )
     weights: dict[str, Tensor] = {}
     for key, value in state.items():
-        tensor = value.float()
-        match = _LAYER.fullmatch(key)
-        if match:
-            side = 'vision_model' if match[1] else 'text_model'
-            weights.update(_layer(f'{side}.encoder.layers.{match[2]}', match[3], tensor))
-        elif key == 'visual.proj':
-            weights['visual_projection.weight'] = tensor.T.contiguous()
-        elif key == 'text_projection':
-            weights['text_projection.weight'] = tensor.T.contiguous()
-        elif key in ('input_resolution', 'context_length', 'vocab_size', 'attn_mask'):
-            continue
-        else:
-            stem, _, last = key.rpartition('.')
-            name = _NAMES.get(key) or (f'{_NAMES[stem]}.{last}' if stem in _NAMES else None)
-            if name is None and key.startswith(_HUGGING_FACE):
-                raise BundleError(
-                    f'{path}: its weights have the names of save_pretrained; give the folder that '
-                    'holds it and its config.json'
-                )
-            if name is None:
-                raise BundleError(
-                    f'{path}: weight {key!r} is of no CLIP with a vision transformer; give '
-                    'another checkpoint'
-                )
-            weights[name] = tensor
+        name, tensor = key, value.float()
+        for old, new in _RENAMES:
+            name = name.replace(old, new)
+        stem, joined, kind = name.partition('in_proj_')
+        if joined:
+            for part, third in zip('qkv', tensor.chunk(3), strict=True):
+                weights[f'{stem}{part}_proj.{kind}'] = third.contiguous()
+        elif name not in _SIZES:
+            weights[name] = tensor.T.contiguous() if name in _TRANSPOSED else tensor
     return weights
-
-
-def _layer(prefix: str, rest: str, tensor: Tensor) -> dict[str, Tensor]:
-    if rest.startswith('attn.in_proj_'):
-        kind = rest.removeprefix('attn.in_proj_')
-        names = ('q_proj', 'k_proj', 'v_proj')
-        return {
-            f'{prefix}.self_attn.{name}.{kind}': part.contiguous()
-            for name, part in zip(names, tensor.chunk(3), strict=True)
-        }
-    stem, _, last = rest.rpartition('.')
-    return {f'{prefix}.{_LAYER_NAMES.get(stem, stem)}.{last}': tensor}
 
 
 def _config(weights: Mapping[str, Tensor], path: Path, activation: str) -> CLIPConfig:

@@ -4,20 +4,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from peace_ros.core.domain import ConfigurationError, Frame
 from peace_ros.core.inference.manifest import InputSpec
 from peace_ros.core.inference.preprocess import Preprocessor
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
 
 _SIDE_PX = 480
 _SUFFIXES = ('.jpg', '.jpeg', '.png')
@@ -41,9 +37,9 @@ _CHECKED_OF = 4
 def divide_pictures(frames: Sequence[Frame] | None) -> tuple[list[Frame], list[Frame]]:
     """Return the pictures to measure scales on and others to check them with.
 
-    What lies beyond a measured range is cut off, and each picture has light and colours of its own:
-    drawn ones widen the ranges of few photos, and only pictures that were not measured can tell
-    whether the ranges are wide enough.
+    Values beyond a measured range are clipped, and light and colours differ between pictures: drawn
+    ones widen the ranges of few photos, and only pictures that were not measured show whether the
+    ranges are wide enough.
 
     Args:
         frames: photos; None: all pictures are drawn.
@@ -82,7 +78,7 @@ def draw_pictures(count: int, seed: int = 0) -> list[Frame]:
 
 
 def plain_pixels(frames: Sequence[Frame], side_px: int) -> list[NDArray[np.float32]]:
-    """Return each frame as a network of its own norm takes it: [1, 3, side, side], RGB 0 to 1."""
+    """Return each frame without normalisation: float32 [1, 3, side, side], RGB 0 to 1."""
     preprocess = Preprocessor(InputSpec(side_px, side_px, 'stretch', (0.0,) * 3, (1.0,) * 3))
     return [preprocess(each.image_rgb).copy() for each in frames]
 

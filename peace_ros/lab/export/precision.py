@@ -4,23 +4,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
-from onnx import NodeProto, helper, numpy_helper
+from numpy.typing import NDArray
+from onnx import GraphProto, NodeProto, helper, numpy_helper
 from onnxruntime.transformers.float16 import DEFAULT_OP_BLOCK_LIST, convert_float_to_float16
 
 from peace_ros.core.domain import BundleError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-    from onnx import GraphProto
-
-    from peace_ros.lab.export.activations import Scale
 
 _KEEP_FP32 = ('LayerNormalization', 'Softmax', 'ArgMax')
 """Sums over hundreds of squares overflow in fp16; TensorRT fuses these as they stand."""
@@ -29,12 +24,12 @@ _KEEP_FP32 = ('LayerNormalization', 'Softmax', 'ArgMax')
 def require_finite(arrays: Iterable[NDArray[Any]], precision: str, what: str) -> None:
     """Raise BundleError when a network answers with numbers that its precision cannot hold.
 
-    To be asked before such answers are compared: the larger one of a number and NaN may be either.
+    Call it before such answers are compared: the maximum of a number and NaN may be either.
     """
     for array in arrays:
         if not np.isfinite(array).all():
             raise BundleError(
-                f'{what} in {precision} answers with infinite numbers, or with none (NaN), on a '
+                f'{what} in {precision} answers with infinite numbers or NaN on a '
                 'picture. Nothing was written; choose another precision, fp32 if this is not it'
             )
 
@@ -54,6 +49,20 @@ EVERY = ('project_in', 'project_out', *MLP)
 """Names of the products in :class:`~peace_ros.lab.export.towers.Layer`."""
 
 
+@dataclass(frozen=True)
+class Scale:
+    """``real = integer * step``: a zero point elsewhere costs OpenVINO more than it gains."""
+
+    step: float
+    is_unsigned: bool
+    """uint8, 0 to 255, for what follows a ReLU; else int8, -127 to 127."""
+
+    @property
+    def limits(self) -> tuple[int, int]:
+        """The least and the largest integer."""
+        return (0, 255) if self.is_unsigned else (-127, 127)
+
+
 def to_int8(path: Path, scales: Mapping[str, Scale]) -> None:
     """Rewrite a graph: the products that have a scale in int8, static; all else stays fp32.
 
@@ -62,8 +71,8 @@ def to_int8(path: Path, scales: Mapping[str, Scale]) -> None:
 
     Args:
         path: of a graph whose nodes are named by the modules they came from.
-        scales: path of the module of a product -> the scale of what enters it. Of several products
-            of one input each has a pair of its own: ONNX Runtime would not fuse a shared one.
+        scales: path of the module of a product -> the scale of what enters it. Several products
+            of one input have a pair each: ONNX Runtime would not fuse a shared one.
     """
     model = onnx.load(str(path))
     graph = model.graph

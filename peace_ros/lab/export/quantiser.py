@@ -5,26 +5,21 @@
 from __future__ import annotations
 
 import copy
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 import torch
 from torch import Tensor, nn
 
+from peace_ros.core.domain import Frame
 from peace_ros.core.inference.preprocess import Preprocessor
+from peace_ros.core.inference.tokenizer import Tokens
 from peace_ros.lab.export import pictures
-from peace_ros.lab.export.activations import best_scale, products_of, watch
-from peace_ros.lab.export.precision import EVERY, MLP, to_int8
+from peace_ros.lab.export.activations import CalibrationInputs, best_scale, products_of, watch
+from peace_ros.lab.export.precision import EVERY, MLP, Scale, to_int8
 from peace_ros.lab.export.smoothing import smooth
+from peace_ros.lab.export.sources import ModelSource
 from peace_ros.lab.export.towers import TextTower
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from peace_ros.core.domain import Frame
-    from peace_ros.core.inference.tokenizer import Tokens
-    from peace_ros.lab.export.activations import CalibrationInputs, Scale
-    from peace_ros.lab.export.sources import ModelSource
 
 _PRODUCTS = {'image_encoder': EVERY, 'decoder': MLP}
 """The decoder's attention is 64 wide: in int8 it gains no time and costs agreement."""
@@ -59,7 +54,7 @@ class Quantiser:
         if role == 'image_encoder':
             self._encoder = tower
         samples = self._samples(role)
-        # The weights of a tower are the reference's, which must stay as they are.
+        # The weights belong to the reference, which must not change.
         own = copy.deepcopy(tower)
         products = products_of(own, _PRODUCTS[role])
         smooth(own, watch(own, products, samples))

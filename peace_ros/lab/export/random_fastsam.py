@@ -26,9 +26,9 @@ _BINS = 16
 _SIZES = {'s': (1 / 3, 0.5, 1024), 'x': (1.0, 1.25, 512)}
 """Depth and width factors, and the widest layer before the factor."""
 _CALM = 0.25
-"""How large what a step adds to what passes is, and what a head says; all else is about one."""
+"""Size of what a step adds and of what a head gives; everything else is about one."""
 _FAINT = 1e-30
-"""Small enough that a planted value stays as it is, yet nothing that an optimiser may drop."""
+"""Too small to change a planted value, but not zero: an optimiser must not remove the product."""
 
 
 def random_fastsam(size: str = 's', *, side_px: int = 640, planted: int = 0, seed: int = 0) -> Yolo:
@@ -37,8 +37,8 @@ def random_fastsam(size: str = 's', *, side_px: int = 640, planted: int = 0, see
     Args:
         size: ``s`` or ``x``.
         side_px: of the square input.
-        planted: random weights see nothing, so this many ellipses can be put in the place of
-            what the network says; it is computed all the same.
+        planted: random weights find nothing, so this many ellipses can replace the answer of the
+            network; it is computed all the same.
         seed: of the weights and the ellipses.
     """
     if size not in _SIZES:
@@ -53,11 +53,11 @@ def random_fastsam(size: str = 's', *, side_px: int = 640, planted: int = 0, see
 
 
 def draw_weights(network: Yolo) -> None:
-    """Draw the weights so that what every layer says is about as large as one, as in trained ones.
+    """Draw the weights so that the output of every layer is about one, as in trained networks.
 
     Layer by layer, while a picture runs through (D. Mishkin, J. Matas, All you need is a good init,
-    ICLR 2016). Otherwise the deeper of the two leaves the numbers that fp16 has. Steps that add to
-    what passes say less, or a network this deep would blow up roundings.
+    ICLR 2016). Otherwise the deeper network exceeds the range of fp16. Steps that add to
+    what passes are smaller, or a network this deep would amplify rounding errors.
     """
     sizes: dict[nn.Module, float] = {}
     for module in network.modules():
@@ -115,10 +115,7 @@ class Yolo(nn.Module):
         self.coefficients = _heads(levels, max(w3 // 4, MASKS), MASKS)
         self.head_lists = (self.boxes, self.confidences, self.coefficients)
         self.prototypes = nn.Sequential(
-            _conv(w3, w3, 3),
-            nn.ConvTranspose2d(w3, w3, 2, 2),
-            _conv(w3, w3, 3),
-            _conv(w3, MASKS),
+            _conv(w3, w3, 3), nn.ConvTranspose2d(w3, w3, 2, 2), _conv(w3, w3, 3), _conv(w3, MASKS)
         )
         self.register_buffer('bins', torch.arange(_BINS, dtype=torch.float32).view(1, 1, -1, 1))
         centres, strides = _anchors(side_px)
@@ -127,7 +124,7 @@ class Yolo(nn.Module):
         self.is_planted = False
 
     def plant(self, predictions: NDArray[np.float32], prototypes: NDArray[np.float32]) -> None:
-        """Say this whatever the image shows."""
+        """Give this answer for every image."""
         self.register_buffer('planted_predictions', torch.from_numpy(predictions))
         self.register_buffer('planted_prototypes', torch.from_numpy(prototypes))
         self.is_planted = True
@@ -160,7 +157,7 @@ class Yolo(nn.Module):
 
 
 class _SplitBlock(nn.Module):
-    """Half of the channels pass, half go through steps, and what each step made is kept."""
+    """Half of the channels pass, half go through steps; the output of each step is kept."""
 
     def __init__(self, inputs: int, outputs: int, steps: int, *, add: bool = False) -> None:
         super().__init__()

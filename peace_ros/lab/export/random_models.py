@@ -4,17 +4,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import torch
 from transformers import CLIPConfig, CLIPModel, CLIPSegConfig, CLIPSegForImageSegmentation
 
 from peace_ros.core.domain import ConfigurationError
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 _TOKENS = 49408
+_END = _TOKENS - 1
+_END_MARKS = {'bos_token_id': _END - 1, 'eos_token_id': _END, 'pad_token_id': _END}
 _FILM_GAIN = 3.0
 """Makes terms differ as much as places do; the library's own initialisation hides them."""
 _LOGIT_SPREAD = 2.0
@@ -28,12 +25,9 @@ def random_clip(size: str, seed: int = 0) -> CLIPModel:
     vision, text, patch = widths[size]
     torch.manual_seed(seed)
     config = CLIPConfig(
-        vision_config={
-            **_tower(vision, 24 if vision == 1024 else 12, 64),
-            'patch_size': patch,
-            'image_size': 224,
-        },
-        text_config={**_tower(text, 12, 64), **_end_marks()},
+        vision_config=_tower(vision, 24 if vision == 1024 else 12)
+        | {'patch_size': patch, 'image_size': 224},
+        text_config=_tower(text, 12) | _END_MARKS,
         projection_dim=text,
     )
     return CLIPModel(config).eval()
@@ -41,18 +35,15 @@ def random_clip(size: str, seed: int = 0) -> CLIPModel:
 
 def random_clipseg(kind: str = 'rd64', seed: int = 0) -> CLIPSegForImageSegmentation:
     """Return a CLIPSeg of the kind ``rd64``, ``rd64-refined`` or ``rd16`` (ViT-B/16, 352 px)."""
-    makers: dict[str, Callable[[], dict[str, Any]]] = {
-        'rd64': lambda: {'reduce_dim': 64},
-        'rd64-refined': lambda: {'reduce_dim': 64, 'use_complex_transposed_convolution': True},
-        'rd16': lambda: {'reduce_dim': 16},
-    }
-    if kind not in makers:
-        raise ConfigurationError(f'CLIPSeg {kind!r}: choose one of {", ".join(makers)}')
+    decoders = {'rd64': (64, False), 'rd64-refined': (64, True), 'rd16': (16, False)}
+    if kind not in decoders:
+        raise ConfigurationError(f'CLIPSeg {kind!r}: choose one of {", ".join(decoders)}')
     torch.manual_seed(seed)
     config = CLIPSegConfig(
         vision_config={'patch_size': 16, 'image_size': 352},
-        text_config=_end_marks(),
-        **makers[kind](),
+        text_config=_END_MARKS,
+        reduce_dim=decoders[kind][0],
+        use_complex_transposed_convolution=decoders[kind][1],
     )
     model = CLIPSegForImageSegmentation(config).eval()
     with torch.no_grad():
@@ -60,17 +51,13 @@ def random_clipseg(kind: str = 'rd64', seed: int = 0) -> CLIPSegForImageSegmenta
     return model
 
 
-def _tower(width: int, layers: int, head: int) -> dict[str, int]:
+def _tower(width: int, layers: int) -> dict[str, int]:
     return {
         'hidden_size': width,
         'intermediate_size': 4 * width,
         'num_hidden_layers': layers,
-        'num_attention_heads': width // head,
+        'num_attention_heads': width // 64,
     }
-
-
-def _end_marks() -> dict[str, int]:
-    return {'bos_token_id': _TOKENS - 2, 'eos_token_id': _TOKENS - 1, 'pad_token_id': _TOKENS - 1}
 
 
 def _let_terms_matter(model: CLIPSegForImageSegmentation) -> None:
@@ -85,7 +72,7 @@ def _let_terms_matter(model: CLIPSegForImageSegmentation) -> None:
         film.weight.normal_(0.0, _FILM_GAIN / spread)
         film.bias.copy_(offset - film.weight @ mean)
     for reduce in decoder.reduces:
-        # Else the deeper features drown what the terms have done to the first ones.
+        # Otherwise the deeper features hide the effect of the terms on the first ones.
         reduce.weight.normal_(0.0, reduce.in_features**-0.5)
     steps = decoder.transposed_convolution
     last = steps[-1] if isinstance(steps, torch.nn.Sequential) else steps

@@ -3,14 +3,13 @@
 """Where FastSAM's segmenter comes from: a checkpoint, an exported graph, or a network in memory.
 
 Checkpoints are read by ultralytics, an optional extra under AGPL-3.0 that is imported here and
-nowhere else; a graph that somebody exported needs neither it nor torch.
+nowhere else; an exported graph needs neither ultralytics nor torch.
 """
 
 from __future__ import annotations
 
 import importlib
 import logging
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +29,6 @@ _LOG = logging.getLogger(__name__)
 Outputs = tuple[NDArray[np.float32], NDArray[np.float32]]
 """Predictions and prototypes."""
 
-OPSET = 17
 USUAL_SIDE_PX = 640
 LICENCE_NOTE = (
     'ultralytics is under AGPL-3.0, and so is a FastSAM network that it reads and converts: who '
@@ -60,8 +58,8 @@ def load_segmenter(source: Path, side_px: int = 0) -> SegmenterSource:
     """Load FastSAM-s or -x from a checkpoint (.pt) or an exported graph (.onnx).
 
     Args:
-        source: the file. Reading a checkpoint runs code that it may hold: take it from where you
-            trust.
+        source: the file. Reading a checkpoint runs code that it may hold: take it from a source
+            that you trust.
         side_px: of the square that frames are letterboxed into, a multiple of 32; 0: the graph's
             own, else 640.
 
@@ -84,19 +82,13 @@ def from_network(
     """Wrap a network of torch that gives predictions and prototypes."""
 
     def write(path: Path) -> None:
-        torch = importlib.import_module('torch')
-        with torch.no_grad(), warnings.catch_warnings():
-            # The newer exporter of torch needs one more package and names the axes its own way.
-            warnings.simplefilter('ignore')
-            torch.onnx.export(
-                network,
-                (torch.zeros(1, 3, side_px, side_px),),
-                str(path),
-                dynamo=False,
-                opset_version=OPSET,
-                input_names=[PIXEL_VALUES],
-                output_names=[PREDICTIONS, PROTOTYPES],
-            )
+        # Only here, because a graph that was exported elsewhere needs no torch.
+        import torch  # noqa: PLC0415
+
+        from peace_ros.lab.export.graphs import write_graph  # noqa: PLC0415
+
+        pixels = torch.zeros(1, 3, side_px, side_px)
+        write_graph(network, (pixels,), path, [PIXEL_VALUES], [PREDICTIONS, PROTOTYPES])
 
     def run(pixels: NDArray[np.float32]) -> Outputs:
         torch = importlib.import_module('torch')
@@ -189,14 +181,14 @@ def _names(path: Path, graph: onnx.GraphProto) -> tuple[str, str, str]:
     predictions = [name for name, dims in ranks.items() if len(dims) == 3]
     prototypes = [name for name, dims in ranks.items() if len(dims) == 4]
     inputs = [each for each in graph.input if each.type.tensor_type.elem_type == _FLOAT]
-    told = ', '.join(f'{name} {list(dims)}' for name, dims in ranks.items())
+    found = ', '.join(f'{name} {list(dims)}' for name, dims in ranks.items())
     fits = len(graph.input) == len(inputs) == len(predictions) == len(prototypes) == 1
     if fits:
         rows, masks = ranks[predictions[0]][1], ranks[prototypes[0]][1]
         fits = not (rows and masks) or rows == 5 + masks
     if not fits:
         raise BundleError(
-            f'{path}: outputs {told}: FastSAM gives predictions [1, 5 + K, A] and prototypes '
+            f'{path}: outputs {found}: FastSAM gives predictions [1, 5 + K, A] and prototypes '
             '[1, K, h, w] from one float32 image; export FastSAM-s.pt or FastSAM-x.pt with '
             '`yolo export format=onnx`, without nms and half'
         )

@@ -13,22 +13,18 @@ transformers lie mostly on one side of their channel.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import torch
 from torch import Tensor, nn
 
+from peace_ros.lab.export.activations import CalibrationInputs
 from peace_ros.lab.export.towers import Layer
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from peace_ros.lab.export.activations import CalibrationInputs
-
 _LEAST = 1e-5
-"""Of a channel's range: those that stay silent are not blown up."""
+"""Of a channel's range: channels that are always zero are not amplified."""
 _STRENGTHS = (0.0, 0.25, 0.5)
-"""Exponents of the division; at 0 there is none, at 0.5 it is shared evenly."""
+"""Exponents of the division; 0: none, 0.5: shared evenly between input and weights."""
 
 
 class Evened(nn.Module):
@@ -50,7 +46,7 @@ def smooth(tower: nn.Module, seen: Mapping[str, CalibrationInputs]) -> None:
 
     Args:
         tower: with :class:`~peace_ros.lab.export.towers.Layer` in it.
-        seen: path of a product -> what enters it; products without an entry stay as they are.
+        seen: path of a product -> what enters it; products without an entry do not change.
     """
     for path, layer in tower.named_modules():
         if not isinstance(layer, Layer):
@@ -65,7 +61,7 @@ def smooth(tower: nn.Module, seen: Mapping[str, CalibrationInputs]) -> None:
         if wide in seen and layer.norm_first:
             _through_norm(layer.norm2, layer.widen, seen[wide])
         elif wide in seen:
-            # The residual needs the norm's output as it is.
+            # The residual needs the unchanged output of the norm.
             layer.before_widen = Evened(*_absorb(layer.widen, seen[wide]))
         narrow = f'{path}.narrow'
         if narrow in seen and isinstance(layer.activation, nn.ReLU):

@@ -19,10 +19,8 @@ from peace_ros.lab.export.openclip import SUFFIXES, is_openclip, load_openclip
 from peace_ros.lab.export.vocabulary import Vocabulary, shipped_vocabulary
 
 _CLASSES = {'clip': CLIPModel, 'clipseg': CLIPSegForImageSegmentation}
-_OPENAI_MEAN, _OPENAI_STD = (
-    (0.48145466, 0.4578275, 0.40821073),
-    (0.26862954, 0.26130258, 0.27577711),
-)
+_OPENAI_MEAN = (0.48145466, 0.4578275, 0.40821073)
+_OPENAI_STD = (0.26862954, 0.26130258, 0.27577711)
 _IMAGENET_MEAN, _IMAGENET_STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 _CLIPSEG_SIDE_PX = 352
 _RESAMPLE = {2: 'bilinear', 3: 'bicubic'}
@@ -182,7 +180,7 @@ def _usual_vocabulary(source: str, model: Any) -> Vocabulary:
     if have != needed:
         raise BundleError(
             f'{source}: its text encoder knows {needed} tokens, the tokenizer of CLIP {have}, and '
-            'it has none of its own; put its tokenizer.json beside the weights'
+            'the checkpoint has no tokenizer; put its tokenizer.json beside the weights'
         )
     return vocabulary
 

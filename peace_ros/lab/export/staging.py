@@ -1,27 +1,31 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Bundles are filled beside their place and put there whole, or not at all."""
+"""Bundles are built beside their place and put there complete, or not at all."""
 
 from __future__ import annotations
 
 import errno
+import json
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from peace_ros.core.domain import BundleError
-from peace_ros.core.inference.bundle import put_in_place
+from peace_ros.core.inference.bundle import MANIFEST_NAME, file_entry, put_in_place
+from peace_ros.core.inference.manifest import FORMAT, ROLES_BY_FAMILY, InputSpec
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @contextmanager
 def staged(folder: Path) -> Iterator[Path]:
-    """Give a folder to fill; when that went well, it takes the place of ``folder``.
+    """Give a folder to fill; without an error it then takes the place of ``folder``.
 
-    Raises BundleError when there is no room or no right to write.
+    Raises BundleError when the disk is full or the folder cannot be written.
     """
     folder = folder.expanduser().absolute()
     try:
@@ -41,5 +45,36 @@ def staged(folder: Path) -> Iterator[Path]:
             else 'choose a folder that can be written'
         )
         raise BundleError(
-            f'{folder}: {error.strerror or error}; {remedy} (a bundle that was there is untouched)'
+            f'{folder}: {error.strerror or error}; {remedy} (an older bundle there is unchanged)'
         ) from error
+
+
+def write_manifest(
+    folder: Path, name: str, family: str, inputs: Mapping[str, InputSpec], **values: Any
+) -> None:
+    """Write manifest.json, the last file of a bundle: it holds the checksums of the others.
+
+    Args:
+        folder: holds a file for each role of the family, named after it.
+        name: of the bundle.
+        family: of the bundle.
+        inputs: ``input``, and for fastsam ``crop_input``.
+        values: the other keys of the manifest.
+    """
+    roles = {
+        role: 'tokenizer.json' if role == 'tokenizer' else f'{role}.onnx'
+        for role in ROLES_BY_FAMILY[family]
+    }
+    manifest = {'format': FORMAT, 'name': name, 'family': family, 'roles': roles}
+    manifest |= {key: asdict(spec) for key, spec in inputs.items()} | values
+    manifest['files'] = {file: file_entry(folder / file) for file in roles.values()}
+    _write(folder, manifest)
+
+
+def change_manifest(folder: Path, **values: Any) -> None:
+    """Replace or add keys of a bundle's manifest."""
+    _write(folder, json.loads((folder / MANIFEST_NAME).read_text(encoding='utf-8')) | values)
+
+
+def _write(folder: Path, manifest: Mapping[str, Any]) -> None:
+    (folder / MANIFEST_NAME).write_text(json.dumps(manifest, indent=2) + '\n', encoding='utf-8')

@@ -3,21 +3,19 @@
 """The towers of CLIP and CLIPSeg as graphs want them, over the weights of the reference model.
 
 The arithmetic is that of ``transformers``; only what the graph does not need is left out: layers
-that nobody reads, and positions that are interpolated anew for every image.
+whose output is not used, and the interpolation of positions for every image.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Callable, Sequence
+from typing import Any, cast
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    Activation = Callable[[Tensor], Tensor]
+Activation = Callable[[Tensor], Tensor]
 
 _MASKED = -1e4
 """Added to the attention of what must not be seen; small enough for fp16."""
@@ -78,7 +76,7 @@ class Layer(nn.Module):
         self.norm1 = reference.layer_norm1
         self.norm2 = reference.layer_norm2
         self.before_widen: nn.Module = nn.Identity()
-        """Set where the input of ``widen`` is to be quantised but also needed as it is."""
+        """Set where the input of ``widen`` is quantised and its unchanged value is needed too."""
         self.widen = reference.mlp.fc1
         self.narrow = reference.mlp.fc2
         self.activation: Activation = reference.mlp.activation_fn

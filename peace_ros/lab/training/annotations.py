@@ -2,17 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rough polygons drawn by hand over real images without labels: ``config/annotations/NAME.yaml``.
 
-A file tells where the picture of that name comes from and under which licence, its scale, whether
-it is kept for validation (``split: val``), and lines of ``class x,y x,y ...`` in percent of width
-and height; ``+`` continues a line. Later polygons cover earlier ones; what no polygon covers stays
-unlabeled. Some pixels are known only in part (a block of yards, a gravel lot): they carry one of
-the partial classes below.
+A file holds the origin of the picture of that name, its licence and scale, whether it is kept for
+validation (``split: val``), and lines of ``class x,y x,y ...`` in percent of width and height;
+``+`` continues a line. Later polygons cover earlier ones; pixels outside of all polygons stay
+unlabeled. Some pixels are known only in part (a block of yards, a gravel lot): they have one of the
+partial classes below.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,11 +21,7 @@ import yaml
 
 from peace_ros.core.domain import ConfigurationError, Label
 from peace_ros.core.resources import config_dir
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from numpy.typing import NDArray
+from peace_ros.lab.training.arrays import Image, Points
 
 VEGETATION = 10
 """Grass or tree: the datasets that do not part them."""
@@ -44,17 +41,9 @@ PARTIAL_CLASSES: dict[int, frozenset[Label]] = {
 }
 """Partial pixel class -> labels that it may be."""
 
-_NAMES = {
+_NAMES = {label.name.lower(): int(label) for label in Label} | {
     '-': int(Label.UNLABELED),
-    'grass': int(Label.GRASS),
     'bare': int(Label.BARE_GROUND),
-    'paved': int(Label.PAVED),
-    'building': int(Label.BUILDING),
-    'tree': int(Label.TREE),
-    'water': int(Label.WATER),
-    'vehicle': int(Label.VEHICLE),
-    'person': int(Label.PERSON),
-    'obstacle': int(Label.OBSTACLE),
     'loose': LOOSE_SURFACE,
     'open': OPEN_GROUND,
     'unsafe': NOT_SAFE,
@@ -75,7 +64,7 @@ class Annotation:
     """Smallest and largest side of a view cut from it."""
     is_validation: bool
     """Its place is kept out of training."""
-    polygons: tuple[tuple[int, NDArray[np.float64]], ...]
+    polygons: tuple[tuple[int, Points], ...]
     """Pixel class and corners (float64 [N, 2], percent of width and height), in drawing order."""
 
 
@@ -83,7 +72,7 @@ def load_annotations() -> list[Annotation]:
     """Read every annotation that ships with the package, by name.
 
     Raises:
-        ConfigurationError: a file says something else than the form above.
+        ConfigurationError: a file does not have the form above.
     """
     return [_load(path) for path in sorted((config_dir() / 'annotations').glob('*.yaml'))]
 
@@ -104,11 +93,11 @@ def _load(path: Path) -> Annotation:
         )
     except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
         raise ConfigurationError(
-            f'{path}: not an annotation ({error!r}); see its neighbours'
+            f'{path}: not an annotation ({error!r}); compare it with the other files there'
         ) from error
 
 
-def _polygon(line: str) -> tuple[int, NDArray[np.float64]]:
+def _polygon(line: str) -> tuple[int, Points]:
     kind, *points = line.split()
     corners = np.array([[float(part) for part in point.split(',')] for point in points])
     if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2:
@@ -116,7 +105,7 @@ def _polygon(line: str) -> tuple[int, NDArray[np.float64]]:
     return _NAMES[kind], corners
 
 
-def rasterise(annotation: Annotation, width_px: int, height_px: int) -> NDArray[np.uint8]:
+def rasterise(annotation: Annotation, width_px: int, height_px: int) -> Image:
     """Return the pixel classes of an annotated image, uint8 height x width."""
     classes = np.zeros((height_px, width_px), dtype=np.uint8)
     for kind, corners in annotation.polygons:

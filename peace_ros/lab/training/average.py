@@ -1,15 +1,13 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Weighted mean of a bundle and what it went on from: ``python -m peace_ros.lab.training.average``.
+"""``python -m peace_ros.lab.training.average``: mean of a bundle and the one it continued from.
 
-Fine-tuned weights gain on what is new and lose on what is old; the straight line between them and
-where they started from often holds both (M. Wortsman et al., Robust fine-tuning of zero-shot
-models, CVPR 2022).
+Fine-tuned weights are better on new data and worse on old data; a point between them and their
+start is often good on both (M. Wortsman et al., Robust fine-tuning of zero-shot models, CVPR 2022).
 """
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 from typing import Annotated
@@ -22,16 +20,16 @@ from onnx import numpy_helper
 from peace_ros.core.domain import BundleError, ConfigurationError
 from peace_ros.core.inference import Bundle
 from peace_ros.core.inference.bundle import MANIFEST_NAME, file_entry
-from peace_ros.lab.export.staging import staged
+from peace_ros.lab.export.staging import change_manifest, staged
 
 _FLOATS = (np.float16, np.float32)
 
 
 def average(before: Path, after: Path, out: Path, share: float) -> None:
-    """Write ``(1 - share) * before + share * after`` as a bundle of its own.
+    """Write ``(1 - share) * before + share * after`` as a new bundle.
 
     Raises:
-        BundleError: one of them is not whole.
+        BundleError: one of them is incomplete.
         ConfigurationError: the share, or two bundles that are not of one architecture.
     """
     if not 0.0 <= share <= 1.0:
@@ -46,7 +44,14 @@ def average(before: Path, after: Path, out: Path, share: float) -> None:
                 onnx.save(mixed, str(stage / path.name))
             else:
                 shutil.copy2(path, stage)
-        _describe(second.folder / MANIFEST_NAME, stage, share)
+        shutil.copy2(second.folder / MANIFEST_NAME, stage)
+        change_manifest(
+            stage,
+            files={name: file_entry(stage / name) for name in second.manifest.files},
+            provenance=f'{second.manifest.provenance} Averaged: {share:g} of these weights and '
+            f'{1.0 - share:g} of those it went on from.',
+            recommended={},  # a threshold belongs to the weights that it was chosen for
+        )
 
 
 def _mix(
@@ -57,8 +62,8 @@ def _mix(
         other = known.get(each.name)
         if other is None or list(other.dims) != list(each.dims):
             raise ConfigurationError(
-                f'{role}: weight {each.name} is not in both bundles; only one that went on from '
-                'the other can be averaged with it'
+                f'{role}: weight {each.name} is not in both bundles; a bundle can only be '
+                'averaged with the one that it continued from'
             )
         values = numpy_helper.to_array(each)
         if values.dtype in _FLOATS:
@@ -66,18 +71,6 @@ def _mix(
             mean = (1.0 - share) * old + share * values.astype(np.float64)
             each.CopyFrom(numpy_helper.from_array(mean.astype(values.dtype), each.name))
     return after
-
-
-def _describe(template: Path, folder: Path, share: float) -> None:
-    """Write the manifest, without the threshold: it was chosen for other weights."""
-    manifest = json.loads(template.read_text(encoding='utf-8'))
-    manifest['files'] = {name: file_entry(folder / name) for name in manifest['files']}
-    manifest['provenance'] += (
-        f' Averaged: {share:g} of these weights and {1.0 - share:g} of those it went on from.'
-    )
-    manifest['recommended'] = {}
-    text = json.dumps(manifest, indent=2) + '\n'
-    (folder / MANIFEST_NAME).write_text(text, encoding='utf-8')
 
 
 def main(

@@ -5,19 +5,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
 from peace_ros.core.domain import Label
+from peace_ros.lab.training.arrays import Image, Rng
 from peace_ros.lab.training.degradations import WAYS, degrade
+from peace_ros.lab.training.sources import TrainingSource
 from peace_ros.simulation.drawing import apply_condition
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from peace_ros.lab.training.sources import TrainingSource
 
 Words = tuple[str, ...]
 
@@ -72,21 +68,16 @@ _LOOKS: tuple[tuple[float, Condition], ...] = (
 _CHANCES = np.array([chance for chance, _ in _LOOKS]) / sum(chance for chance, _ in _LOOKS)
 
 
-def all_conditions() -> tuple[Condition, ...]:
-    """Return every look that training knows."""
-    return tuple(condition for _, condition in _LOOKS)
-
-
-def pick_condition(rng: np.random.Generator, source: TrainingSource, chance: float) -> Condition:
+def pick_condition(rng: Rng, source: TrainingSource, chance: float) -> Condition:
     """Draw a look (or none) for a view of a source, and complete its words."""
     if rng.random() < chance:
         look = _LOOKS[int(rng.choice(len(_LOOKS), p=_CHANCES))][1]
     else:
         look = Condition('plain')
-    return complete(look, source)
+    return _complete(look, source)
 
 
-def complete(look: Condition, source: TrainingSource) -> Condition:
+def _complete(look: Condition, source: TrainingSource) -> Condition:
     """Add to a look the words that are true of its source anyway."""
     drawn = source.kind == 'drawn'
     resolution = look.resolution or (('rendered', '3D rendered') if drawn else ())
@@ -102,13 +93,8 @@ def complete(look: Condition, source: TrainingSource) -> Condition:
     return Condition(look.name, resolution, frame, environment, plain)
 
 
-def apply(
-    condition: Condition,
-    image: NDArray[np.uint8],
-    classes: NDArray[np.uint8],
-    rng: np.random.Generator,
-) -> NDArray[np.uint8]:
-    """Return the image under a look, same shape and type; ``classes`` tell snow where to lie."""
+def apply(condition: Condition, image: Image, classes: Image, rng: Rng) -> Image:
+    """Return the image under a look, same shape and type; ``classes`` say where snow lies."""
     if condition.name == 'plain':
         return image
     if condition.name in WAYS and rng.random() < 0.7:
@@ -122,7 +108,7 @@ def apply(
     return np.asarray(changed, dtype=np.uint8)
 
 
-def _painted(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+def _painted(image: Image, rng: Rng) -> Image:
     flat = cv2.medianBlur(image, 2 * int(rng.integers(3, 6)) + 1)
     grey = cv2.cvtColor(flat, cv2.COLOR_RGB2GRAY)
     edges = cv2.adaptiveThreshold(
@@ -134,7 +120,7 @@ def _painted(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.u
     return np.asarray(np.clip(inked, 0, 255), dtype=np.uint8)
 
 
-def _heat_map(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+def _heat_map(image: Image, rng: Rng) -> Image:
     maps = (cv2.COLORMAP_JET, cv2.COLORMAP_INFERNO, cv2.COLORMAP_HOT)
     painted = cv2.applyColorMap(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), maps[rng.integers(3)])
     return np.ascontiguousarray(painted[:, :, ::-1], dtype=np.uint8)

@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-import json
-import warnings
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -16,23 +15,16 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from peace_ros.core.domain import Label
-from peace_ros.core.inference.bundle import file_entry
+from peace_ros.core.inference import contract
+from peace_ros.core.inference.manifest import InputSpec
+from peace_ros.lab.export.graphs import write_graph
+from peace_ros.lab.export.staging import write_manifest
+from peace_ros.lab.training import networks
 from peace_ros.lab.training.backbone import MEAN, STD
-from peace_ros.lab.training.networks import (
-    EMBEDDING_WIDTH,
-    FEATURE_CHANNELS,
-    STRIDE,
-    Decoder,
-    Ranker,
-    SegmenterNetwork,
-)
+from peace_ros.lab.training.batches import encode
 from peace_ros.lab.training.sources import FRAME_PX
-from peace_ros.lab.training.text import CONTEXT_LENGTH, build_tokenizer, save_tokenizer
+from peace_ros.lab.training.text import CONTEXT_LENGTH, build_tokenizer
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-OPSET = 17
 RANKER_PX = 224
 _HALF_FROM_ELEMENTS = 64
 _BATCH_AND_LENGTH = {0: 'B', 1: 'L'}
@@ -44,7 +36,7 @@ _PEOPLE = slice(Label.PERSON - 1, Label.PERSON)
 class DecoderGraph(nn.Module):
     """The decoder with everything that the contract wants computed in the graph."""
 
-    def __init__(self, decoder: Decoder) -> None:
+    def __init__(self, decoder: networks.Decoder) -> None:
         super().__init__()
         self.decoder = decoder
 
@@ -73,27 +65,16 @@ def widen_people(class_logits: Tensor) -> Tensor:
 
 def _grow(maps: Tensor) -> Tensor:
     return functional.interpolate(
-        maps, scale_factor=float(STRIDE), mode='bilinear', align_corners=False
+        maps, scale_factor=float(networks.STRIDE), mode='bilinear', align_corners=False
     )
 
 
-def _export(
+def export_graph(
     module: nn.Module, inputs: tuple[Tensor, ...], path: Path, names: tuple[str, ...],
-    outputs: tuple[str, ...], axes: dict[str, dict[int, str]], *, halve: bool,
+    outputs: tuple[str, ...], axes: dict[str, dict[int, str]] | None = None, *, halve: bool,
 ) -> None:  # fmt: skip
-    with warnings.catch_warnings():
-        # The newer exporter needs one more package and unrolls the dynamic axes differently.
-        warnings.simplefilter('ignore')
-        torch.onnx.export(
-            module.eval(),
-            inputs,
-            str(path),
-            dynamo=False,
-            opset_version=OPSET,
-            input_names=list(names),
-            output_names=list(outputs),
-            dynamic_axes=axes,
-        )
+    """Write a module as a graph; ``halve`` stores its large weights in half the bytes."""
+    write_graph(module, inputs, path, names, outputs, axes)
     graph = onnx.load(str(path))
     if halve:
         halve_weights(graph)
@@ -120,110 +101,76 @@ def halve_weights(model: onnx.ModelProto) -> None:
         graph.node.insert(offset, node)
 
 
-def export_text(text: nn.Module, path: Path, *, halve: bool = True) -> None:
-    """Write a text tower."""
-    encoded = build_tokenizer().encode_batch(['grass', 'a road'])
-    ids = torch.tensor([each.ids for each in encoded])
-    mask = torch.tensor([each.attention_mask for each in encoded])
-    _export(
+def export_text(text: nn.Module, folder: Path, *, halve: bool) -> None:
+    """Write a text tower and its tokenizer."""
+    export_graph(
         text,
-        (ids, mask),
-        path,
-        ('input_ids', 'attention_mask'),
-        ('text_embedding',),
+        encode(['grass', 'a road']),
+        folder / 'text_encoder.onnx',
+        (contract.INPUT_IDS, contract.ATTENTION_MASK),
+        (contract.TEXT_EMBEDDING,),
         {
-            'input_ids': _BATCH_AND_LENGTH,
-            'attention_mask': _BATCH_AND_LENGTH,
-            'text_embedding': {0: 'B'},
+            contract.INPUT_IDS: _BATCH_AND_LENGTH,
+            contract.ATTENTION_MASK: _BATCH_AND_LENGTH,
+            contract.TEXT_EMBEDDING: {0: 'B'},
         },
         halve=halve,
     )
+    build_tokenizer().save(str(folder / 'tokenizer.json'))
+
+
+def write_trained_manifest(
+    folder: Path, family: str, inputs: dict[str, InputSpec], **values: Any
+) -> None:
+    """Write the manifest of a bundle that was trained here."""
+    write_manifest(
+        folder, folder.name, family, inputs, **values, embedding_width=networks.EMBEDDING_WIDTH,
+        context_length=CONTEXT_LENGTH, precision='fp32', licence='Apache-2.0',
+    )  # fmt: skip
 
 
 def export_segmenter(
-    model: SegmenterNetwork, folder: Path, *, provenance: str, recommended: dict[str, float],
-    halve: bool = True,
+    model: networks.SegmenterNetwork, folder: Path, *, provenance: str,
+    recommended: dict[str, float] | None = None, halve: bool = True,
 ) -> None:  # fmt: skip
-    """Write the clipseg bundle; ``halve`` stores the weights in half the bytes."""
+    """Write the clipseg bundle."""
     folder.mkdir(parents=True, exist_ok=True)
     pixels = torch.zeros(1, 3, FRAME_PX, FRAME_PX)
-    _export(model.encoder, (pixels,), folder / 'image_encoder.onnx', ('pixel_values',),
-            ('features',), {}, halve=halve)  # fmt: skip
-    export_text(model.text, folder / 'text_encoder.onnx', halve=halve)
-    side = FRAME_PX // STRIDE
-    _export(
+    export_graph(model.encoder, (pixels,), folder / 'image_encoder.onnx', (contract.PIXEL_VALUES,),
+                 ('features',), halve=halve)  # fmt: skip
+    export_text(model.text, folder, halve=halve)
+    side = FRAME_PX // networks.STRIDE
+    export_graph(
         DecoderGraph(model.decoder),
         (
-            torch.zeros(1, FEATURE_CHANNELS, side, side),
-            torch.zeros(3, EMBEDDING_WIDTH),
+            torch.zeros(1, networks.FEATURE_CHANNELS, side, side),
+            torch.zeros(3, networks.EMBEDDING_WIDTH),
             torch.tensor([1.0, 0.0, 0.0]),
         ),
         folder / 'decoder.onnx',
-        ('features', 'text_embedding', 'is_positive'),
-        ('positive', 'negative', 'softmax_positive', 'term_logits'),
-        {'text_embedding': {0: 'T'}, 'is_positive': {0: 'T'}, 'term_logits': {0: 'T'}},
+        ('features', contract.TEXT_EMBEDDING, contract.IS_POSITIVE),
+        (contract.POSITIVE, contract.NEGATIVE, contract.SOFTMAX_POSITIVE, contract.TERM_LOGITS),
+        {
+            contract.TEXT_EMBEDDING: {0: 'T'},
+            contract.IS_POSITIVE: {0: 'T'},
+            contract.TERM_LOGITS: {0: 'T'},
+        },
         halve=halve,
     )
-    roles = {
-        'image_encoder': 'image_encoder.onnx',
-        'text_encoder': 'text_encoder.onnx',
-        'decoder': 'decoder.onnx',
-        'tokenizer': 'tokenizer.json',
-    }
-    write_manifest(folder, 'clipseg', roles, FRAME_PX, provenance, recommended)
+    spec = InputSpec(FRAME_PX, FRAME_PX, 'stretch', MEAN, STD)
+    write_trained_manifest(
+        folder, 'clipseg', {'input': spec}, provenance=provenance, recommended=recommended or {}
+    )
 
 
 def export_ranker(
-    model: Ranker, folder: Path, *, provenance: str, recommended: dict[str, float],
-    halve: bool = True,
-) -> None:  # fmt: skip
-    """Write the clip bundle; ``halve`` stores the weights in half the bytes."""
+    model: networks.Pair, folder: Path, *, provenance: str, halve: bool = True
+) -> None:
+    """Write the clip bundle."""
     folder.mkdir(parents=True, exist_ok=True)
     pixels = torch.zeros(1, 3, RANKER_PX, RANKER_PX)
-    _export(model.image, (pixels,), folder / 'image_encoder.onnx', ('pixel_values',),
-            ('image_embedding',), {}, halve=halve)  # fmt: skip
-    export_text(model.text, folder / 'text_encoder.onnx', halve=halve)
-    roles = {
-        'image_encoder': 'image_encoder.onnx',
-        'text_encoder': 'text_encoder.onnx',
-        'tokenizer': 'tokenizer.json',
-    }
-    write_manifest(folder, 'clip', roles, RANKER_PX, provenance, recommended)
-
-
-def write_manifest(
-    folder: Path, family: str, roles: dict[str, str], side_px: int, provenance: str,
-    recommended: dict[str, float],
-) -> None:  # fmt: skip
-    """Write tokenizer and manifest; the manifest comes last and vouches for every file."""
-    save_tokenizer(folder / roles['tokenizer'])
-    files = {name: file_entry(folder / name) for name in roles.values()}
-    manifest: dict[str, Any] = {
-        'format': 1,
-        'name': folder.name,
-        'family': family,
-        'roles': roles,
-        'input': {
-            'width': side_px,
-            'height': side_px,
-            'resize': 'stretch',
-            'mean': list(MEAN),
-            'std': list(STD),
-        },
-        'embedding_width': EMBEDDING_WIDTH,
-        'context_length': CONTEXT_LENGTH,
-        'precision': 'fp32',
-        'files': files,
-        'licence': 'Apache-2.0',
-        'provenance': provenance,
-        'recommended': recommended,
-    }
-    text = json.dumps(manifest, indent=2) + '\n'
-    (folder / 'manifest.json').write_text(text, encoding='utf-8')
-
-
-def with_weights(model: nn.Module, state: dict[str, Tensor]) -> nn.Module:
-    """Load averaged weights and return the model ready to export (contiguous memory)."""
-    model.load_state_dict(state)
-    model.to(memory_format=torch.contiguous_format)  # type: ignore[call-overload]
-    return model.eval()
+    export_graph(model.image, (pixels,), folder / 'image_encoder.onnx', (contract.PIXEL_VALUES,),
+                 (contract.IMAGE_EMBEDDING,), halve=halve)  # fmt: skip
+    export_text(model.text, folder, halve=halve)
+    spec = InputSpec(RANKER_PX, RANKER_PX, 'stretch', MEAN, STD)
+    write_trained_manifest(folder, 'clip', {'input': spec}, provenance=provenance, recommended={})

@@ -16,24 +16,17 @@ import numpy as np
 import typer
 
 from peace_ros.core.domain import Label, WorldError
-from peace_ros.lab.training.annotations import (
-    LOOSE_SURFACE,
-    NOT_SAFE,
-    OPEN_GROUND,
-    PIXEL_CLASS_COUNT,
-    VEGETATION,
-    load_annotations,
-    rasterise,
-)
+from peace_ros.lab.training import annotations
+from peace_ros.lab.training.sources import annotated_photographs, read_image
 
 _SIDE_PX = 704
 """Longest of the shorter sides: pixels of all photographs are pooled, and a sharp one is not worth
 more than a coarse one. Two of the network's inputs."""
-_LABELS = np.arange(PIXEL_CLASS_COUNT, dtype=np.uint8)
-# What may be either does not count; all that is certain of NOT_SAFE is that nobody may land on it.
-_LABELS[[VEGETATION, LOOSE_SURFACE]] = Label.UNLABELED
-_LABELS[OPEN_GROUND] = Label.GRASS
-_LABELS[NOT_SAFE] = Label.OBSTACLE
+_LABELS = np.arange(annotations.PIXEL_CLASS_COUNT, dtype=np.uint8)
+# What may be either does not count; of NOT_SAFE it is only certain that nobody may land on it.
+_LABELS[[annotations.VEGETATION, annotations.LOOSE_SURFACE]] = Label.UNLABELED
+_LABELS[annotations.OPEN_GROUND] = Label.GRASS
+_LABELS[annotations.NOT_SAFE] = Label.OBSTACLE
 
 
 def write_held_out(real: Path, out: Path) -> int:
@@ -42,11 +35,11 @@ def write_held_out(real: Path, out: Path) -> int:
     Raises:
         WorldError: none of the photographs lies in ``ortho`` of the folder.
     """
-    kept = [each for each in load_annotations() if each.is_validation]
-    paths = [(each, real / 'ortho' / f'{each.name}.jpg') for each in kept]
-    there = [(each, path) for each, path in paths if path.is_file()]
+    there = annotated_photographs(real, is_validation=True)
     if not there:
-        names = ', '.join(each.name for each in kept)
+        names = ', '.join(
+            each.name for each in annotations.load_annotations() if each.is_validation
+        )
         raise WorldError(
             f'{real}/ortho: holds none of {names} (.jpg); their files in config/annotations say '
             'where to get them'
@@ -54,13 +47,11 @@ def write_held_out(real: Path, out: Path) -> int:
     for folder in ('images', 'labels'):
         (out / folder).mkdir(parents=True, exist_ok=True)
     for annotation, path in there:
-        image = cv2.imread(str(path))
-        if image is None:
-            raise WorldError(f'{path}: cannot be read as an image; get it again')
+        image = read_image(path)
         scale = min(1.0, _SIDE_PX / min(image.shape[:2]))
         image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-        labels = _LABELS[rasterise(annotation, image.shape[1], image.shape[0])]
-        cv2.imwrite(str(out / 'images' / f'{annotation.name}.png'), image)
+        labels = _LABELS[annotations.rasterise(annotation, image.shape[1], image.shape[0])]
+        cv2.imwrite(str(out / 'images' / f'{annotation.name}.png'), image[..., ::-1])
         cv2.imwrite(str(out / 'labels' / f'{annotation.name}.png'), labels)
     return len(there)
 

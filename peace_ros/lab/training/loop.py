@@ -1,24 +1,22 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The training loop that both networks share: clock, learning rate, average, checkpoint, curve."""
+"""The training loop of all networks: clock, learning rate, average, checkpoint, curve."""
 
 from __future__ import annotations
 
-import csv
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, pi
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 import torch
+from torch import Tensor, nn
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
+from peace_ros.lab.training.batches import BatchT, Maker
 
-    from torch import Tensor, nn
-
-    from peace_ros.lab.training.batches import Batch, BatchMaker
+NetworkT = TypeVar('NetworkT', bound=nn.Module)
 
 AVERAGE_DECAY = 0.998
 _CHECKPOINT_EVERY_S = 60.0
@@ -63,9 +61,9 @@ def learning_rate(peak: float, progress: float) -> float:
 
 
 def train(
-    model: nn.Module,
-    maker: BatchMaker,
-    loss_of: Callable[[nn.Module, Batch], dict[str, Tensor]],
+    model: NetworkT,
+    maker: Maker[BatchT],
+    loss_of: Callable[[NetworkT, BatchT], dict[str, Tensor]],
     budget: TimeBudget,
     *,
     peak_rate: float,
@@ -73,8 +71,8 @@ def train(
     name: str,
     report: Callable[[float, str], None],
     slower: tuple[str, float] = ('', 1.0),
-) -> dict[str, Tensor]:
-    """Train in place and return the averaged weights.
+) -> NetworkT:
+    """Train in place and return the network with the averaged weights, ready to export.
 
     ``loss_of`` returns named losses; their sum is minimised. A checkpoint in ``folder`` is
     continued when one lies there. ``report`` gets the progress (0 to 1) and a line of figures.
@@ -93,6 +91,16 @@ def train(
         step, elapsed_s = stored['step'], stored['elapsed_s']
     else:
         curve.unlink(missing_ok=True)
+
+    def save() -> None:
+        stored = {
+            'model': model.state_dict(), 'optimiser': optimiser.state_dict(),
+            'average': average.state, 'step': step, 'elapsed_s': elapsed_s,
+        }  # fmt: skip
+        partial = checkpoint.with_suffix('.part')
+        torch.save(stored, partial)
+        partial.replace(checkpoint)
+
     model.train()
     saved_s = seen_s = time.monotonic()
     means: dict[str, float] = {}
@@ -121,10 +129,12 @@ def train(
             _write_curve(curve, step, elapsed_s, means)
         if now_s - saved_s > _CHECKPOINT_EVERY_S:
             saved_s = now_s
-            _save(checkpoint, model, optimiser, average, step, elapsed_s)
+            save()
     batches.close()  # type: ignore[attr-defined]
-    _save(checkpoint, model, optimiser, average, step, elapsed_s)
-    return average.state
+    save()
+    model.load_state_dict(average.state)
+    # The exporter wants contiguous memory.
+    return model.to(memory_format=torch.contiguous_format).eval()  # type: ignore[call-overload]
 
 
 def _groups(model: nn.Module, prefix: str, share: float) -> list[dict[str, Any]]:
@@ -136,28 +146,10 @@ def _groups(model: nn.Module, prefix: str, share: float) -> list[dict[str, Any]]
     return [{'params': values, 'share': part} for values, part in groups if values]
 
 
-def _save(
-    path: Path, model: nn.Module, optimiser: torch.optim.Optimizer, average: Averaged,
-    step: int, elapsed_s: float,
-) -> None:  # fmt: skip
-    partial = path.with_suffix('.part')
-    torch.save(
-        {
-            'model': model.state_dict(),
-            'optimiser': optimiser.state_dict(),
-            'average': average.state,
-            'step': step,
-            'elapsed_s': elapsed_s,
-        },
-        partial,
-    )
-    partial.replace(path)
-
-
 def _write_curve(path: Path, step: int, elapsed_s: float, means: dict[str, float]) -> None:
-    new = not path.exists()
-    with path.open('a', newline='') as file:
-        writer = csv.writer(file)
-        if new:
-            writer.writerow(['step', 'elapsed_s', *means])
-        writer.writerow([step, f'{elapsed_s:.1f}', *(f'{value:.5f}' for value in means.values())])
+    if not path.exists():
+        path.write_text(','.join(('step', 'elapsed_s', *means)) + '\n')
+    with path.open('a') as file:
+        file.write(
+            ','.join((f'{step},{elapsed_s:.1f}', *(f'{v:.5f}' for v in means.values()))) + '\n'
+        )

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What training punishes: wrong classes, wrong prompt masks, hazards called safe most of all."""
+"""Losses of the segmenter: wrong classes, wrong prompt masks, hazards called safe most of all."""
 
 from __future__ import annotations
 
@@ -9,27 +9,26 @@ from torch import Tensor
 from torch.nn import functional
 
 from peace_ros.core.domain import Label
-from peace_ros.lab.training.annotations import (
-    LOOSE_SURFACE,
-    NOT_SAFE,
-    OPEN_GROUND,
-    PIXEL_CLASS_COUNT,
-    VEGETATION,
-)
+from peace_ros.lab.training import annotations
 from peace_ros.lab.training.networks import STRIDE
 
 _CLASS_WEIGHTS = {
     Label.GRASS: 1.0, Label.BARE_GROUND: 1.0, Label.PAVED: 1.0, Label.BUILDING: 1.1,
     Label.TREE: 1.6, Label.WATER: 1.5, Label.VEHICLE: 2.0, Label.PERSON: 14.0, Label.OBSTACLE: 4.0,
 }  # fmt: skip
-_PARTIAL_WEIGHTS = {VEGETATION: 0.6, LOOSE_SURFACE: 0.6, OPEN_GROUND: 0.8, NOT_SAFE: 1.0}
+_PARTIAL_WEIGHTS = {
+    annotations.VEGETATION: 0.6,
+    annotations.LOOSE_SURFACE: 0.6,
+    annotations.OPEN_GROUND: 0.8,
+    annotations.NOT_SAFE: 1.0,
+}
 FALSE_SAFE_WEIGHT = 2.5
 """A hazard pixel that a safe-ground prompt selects costs this much more than a missed one."""
 
 
 def class_weights() -> Tensor:
     """Return the weight of each pixel class: float32 [pixel classes]; unlabeled weighs nothing."""
-    weights = torch.zeros(PIXEL_CLASS_COUNT)
+    weights = torch.zeros(annotations.PIXEL_CLASS_COUNT)
     for index, weight in (_CLASS_WEIGHTS | _PARTIAL_WEIGHTS).items():
         weights[index] = weight
     return weights
@@ -37,14 +36,8 @@ def class_weights() -> Tensor:
 
 def shares(classes: Tensor) -> Tensor:
     """Return how much of each feature cell is of each pixel class: [B, H, W] -> [B, P, h, w]."""
-    batch, height, width = classes.shape
-    rows, columns = height // STRIDE, width // STRIDE
-    cells = classes.reshape(batch, rows, STRIDE, columns, STRIDE).permute(0, 1, 3, 2, 4)
-    cells = cells.reshape(batch * rows * columns, STRIDE * STRIDE)
-    counts = torch.zeros(cells.shape[0], PIXEL_CLASS_COUNT)
-    counts.scatter_add_(1, cells, torch.ones_like(cells, dtype=torch.float32))
-    counts = counts.reshape(batch, rows, columns, PIXEL_CLASS_COUNT) / STRIDE**2
-    return counts.permute(0, 3, 1, 2).contiguous()
+    one_hot = functional.one_hot(classes, annotations.PIXEL_CLASS_COUNT).permute(0, 3, 1, 2)
+    return functional.avg_pool2d(one_hot.to(torch.float32), STRIDE)
 
 
 def class_loss(logits: Tensor, share: Tensor, table: Tensor, weights: Tensor) -> Tensor:

@@ -41,19 +41,6 @@ class ConvBn(nn.Sequential):
         super().__init__(*layers)
 
 
-class Residual(nn.Module):
-    """Two 3 x 3 convolutions around a skip."""
-
-    def __init__(self, channels: int) -> None:
-        super().__init__()
-        self.first = ConvBn(channels, channels)
-        self.second = ConvBn(channels, channels, relu=False)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Keep the shape."""
-        return functional.relu(x + self.second(self.first(x)))
-
-
 class ImageEncoder(nn.Module):
     """RGB [B, 3, H, W] -> features [B, 48, H/4, W/4]; H and W are multiples of 32.
 
@@ -90,6 +77,11 @@ def double(x: Tensor) -> Tensor:
     return functional.interpolate(x, scale_factor=2.0, mode='bilinear', align_corners=False)
 
 
+def unit(vectors: Tensor) -> Tensor:
+    """Return vectors [B, D] of unit length."""
+    return vectors / (vectors.square().sum(dim=1, keepdim=True) + 1e-8).sqrt()
+
+
 class SmallTextTower(nn.Module):
     """Token ids and mask [B, L] -> unit-length embeddings [B, D].
 
@@ -115,7 +107,7 @@ class SmallTextTower(nn.Module):
         peak = (words - 1e4 * (1.0 - mask)).amax(dim=1)
         hidden = functional.relu(self.first(torch.cat([mean, peak], dim=1)))
         out = self.second(hidden) + mean
-        return cast('Tensor', out / (out.square().sum(dim=1, keepdim=True) + 1e-8).sqrt())
+        return unit(out)
 
 
 class Decoder(nn.Module):
@@ -144,12 +136,8 @@ class Decoder(nn.Module):
         """Return [..., 9]: which labels a prompt stands for."""
         return cast('Tensor', self.meaning(8.0 * embedding))
 
-    def forward(self, features: Tensor, embedding: Tensor) -> Tensor:
-        """[B, C, h, w] and [B, T, D] -> logits [B, T, h, w]."""
-        return self.mix(self.classes(features), features, embedding)
-
     def mix(self, class_logits: Tensor, features: Tensor, embedding: Tensor) -> Tensor:
-        """Do the same with class logits that are already known."""
+        """[B, 9, h, w], [B, C, h, w] and [B, T, D] -> logits [B, T, h, w]."""
         batch, channels, height, width = features.shape
         terms, cells = embedding.shape[1], height * width
         label = torch.softmax(class_logits, dim=1).reshape(batch, CLASS_COUNT, cells)
@@ -180,8 +168,8 @@ class SegmenterNetwork(nn.Module):
 class RankerImage(nn.Module):
     """RGB [B, 3, 224, 224] -> embedding [B, D].
 
-    What tells night from fog and blur from sharp is low-level: the tower reads means and spreads
-    of the shallow maps of a pretrained backbone, beside statistics of colour, and of gradients at
+    Low-level features separate night from fog and blurred from sharp: the tower reads means and
+    spreads of the shallow maps of a pretrained backbone, statistics of colour, and gradients at
     several scales.
     """
 
@@ -211,7 +199,7 @@ class RankerImage(nn.Module):
         for level in self.backbone(pixels).values():
             parts += _moments(level)
         out = self.head(self.norm(torch.cat(parts, dim=1)))
-        return cast('Tensor', out / (out.square().sum(dim=1, keepdim=True) + 1e-8).sqrt())
+        return unit(out)
 
 
 def _tones(pixels: Tensor) -> tuple[Tensor, Tensor]:
@@ -235,11 +223,16 @@ def _moments(x: Tensor) -> tuple[Tensor, Tensor]:
     return mean, spread.sqrt()
 
 
-class Ranker(nn.Module):
-    """The CLIP-like pair."""
+class Pair(nn.Module):
+    """A CLIP-like pair: an image tower and a text tower of the same width."""
 
-    def __init__(self, vocabulary_size: int) -> None:
+    def __init__(self, image: nn.Module, vocabulary_size: int, *, most_scale: float) -> None:
         super().__init__()
-        self.image = RankerImage()
+        self.image = image
         self.text = SmallTextTower(vocabulary_size)
         self.log_scale = nn.Parameter(torch.tensor(2.5))
+        self._most_scale = most_scale
+
+    def scale(self) -> Tensor:
+        """Return what cosines are multiplied by before a softmax."""
+        return self.log_scale.exp().clamp(max=self._most_scale)

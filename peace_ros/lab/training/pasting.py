@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import Label
-
-Image = NDArray[np.uint8]
+from peace_ros.lab.training.arrays import Image, Points, Rng
 
 _CAR_COLOURS = (
     (235, 235, 235), (200, 202, 205), (140, 142, 146), (60, 62, 66), (25, 26, 30), (150, 30, 30),
@@ -43,40 +42,38 @@ _CROWN_COLOURS = (
 )  # fmt: skip
 
 
-def _rectangle(
-    centre: tuple[float, float], length: float, width: float, angle: float
-) -> NDArray[np.float64]:
+def _rectangle(centre: tuple[float, float], length: float, width: float, angle: float) -> Points:
     along = np.array([np.cos(angle), np.sin(angle)])
     across = np.array([-along[1], along[0]])
     corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
     return np.array([centre + a * length * along + b * width * across for a, b in corners])
 
 
-def _somewhere(image: Image, rng: np.random.Generator) -> tuple[tuple[float, float], float]:
+def _somewhere(image: Image, rng: Rng) -> tuple[tuple[float, float], float]:
     """Return a place in the image and a direction."""
     height, side = image.shape[:2]
     centre = (rng.uniform(0, side), rng.uniform(0, height))
     return centre, rng.uniform(0, np.pi)
 
 
-def _grain(image: Image, mask: NDArray[np.bool_], rng: np.random.Generator, most: float) -> None:
+def _grain(image: Image, mask: NDArray[np.bool_], rng: Rng, most: float) -> None:
     """Roughen what a mask covers, by up to ``most`` grey levels (one sigma)."""
     noise = rng.normal(0, rng.uniform(1, most), mask.sum())[:, None]
     image[mask] = np.clip(image[mask] + noise, 0, 255).astype(np.uint8)
 
 
-def _fill(image: Image, polygon: NDArray[np.float64], colour: tuple[float, ...]) -> None:
+def _fill(image: Image, polygon: Points, colour: tuple[float, ...]) -> None:
     points = np.round(polygon * 16).astype(np.int32)
     cv2.fillPoly(image, [points], colour, cv2.LINE_AA, 4)
 
 
-def _mask(shape: tuple[int, ...], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _mask(shape: tuple[int, ...], polygon: Points) -> NDArray[np.bool_]:
     mask = np.zeros(shape[:2], dtype=np.uint8)
     cv2.fillPoly(mask, [np.round(polygon * 16).astype(np.int32)], 1, cv2.LINE_8, 4)
     return mask.astype(bool)
 
 
-def darken(image: Image, polygon: NDArray[np.float64], factor: float) -> None:
+def darken(image: Image, polygon: Points, factor: float) -> None:
     """Lay a shadow (bluish, as under a clear sky) over a polygon."""
     x0, y0 = np.maximum(np.floor(polygon.min(axis=0)).astype(int), 0)
     x1, y1 = np.ceil(polygon.max(axis=0)).astype(int) + 1
@@ -91,15 +88,13 @@ def darken(image: Image, polygon: NDArray[np.float64], factor: float) -> None:
 
 
 def _jittered(
-    rng: np.random.Generator, colours: tuple[tuple[int, int, int], ...], spread: float
+    rng: Rng, colours: tuple[tuple[int, int, int], ...], spread: float
 ) -> tuple[float, ...]:
     base = np.array(colours[int(rng.integers(len(colours)))], dtype=float)
     return tuple(float(v) for v in np.clip(base + rng.normal(0, spread, 3), 5, 250))
 
 
-def paste_car(
-    image: Image, classes: Image, rng: np.random.Generator, gsd_m: float, sun: NDArray[np.float64]
-) -> None:
+def paste_car(image: Image, classes: Image, rng: Rng, gsd_m: float, sun: Points) -> None:
     """Paste a car, van or lorry with windows and shadow; ``sun`` is the shadow of 1 m height."""
     kind = rng.random()
     length_m = rng.uniform(3.6, 5.0) if kind < 0.8 else rng.uniform(5.5, 12.0)
@@ -121,9 +116,7 @@ def paste_car(
     classes[_mask(image.shape, body)] = Label.VEHICLE
 
 
-def paste_person(
-    image: Image, classes: Image, rng: np.random.Generator, gsd_m: float, sun: NDArray[np.float64]
-) -> None:
+def paste_person(image: Image, classes: Image, rng: Rng, gsd_m: float, sun: Points) -> None:
     """Paste a person seen from above with a cast shadow."""
     radius = rng.uniform(0.22, 0.34) / gsd_m
     if radius < 0.45:
@@ -149,7 +142,7 @@ def paste_person(
 
 
 def paste_standing_person(
-    image: Image, classes: Image, rng: np.random.Generator, gsd_m: float, sun: NDArray[np.float64]
+    image: Image, classes: Image, rng: Rng, gsd_m: float, sun: Points
 ) -> None:
     """Paste a person seen from aside, as cameras that look ahead or lean do: legs, body, head."""
     height = rng.uniform(0.5, 1.7) / gsd_m
@@ -181,9 +174,7 @@ def paste_standing_person(
     classes[whole > 0] = Label.PERSON
 
 
-def paste_roof(
-    image: Image, classes: Image, rng: np.random.Generator, gsd_m: float, sun: NDArray[np.float64]
-) -> None:
+def paste_roof(image: Image, classes: Image, rng: Rng, gsd_m: float, sun: Points) -> None:
     """Paste a house: flat or with two slopes, plain or ribbed, in any roof colour, with shadow."""
     length, width = rng.uniform(5, 22) / gsd_m, rng.uniform(4, 12) / gsd_m
     centre, angle = _somewhere(image, rng)
@@ -213,7 +204,7 @@ def paste_roof(
     classes[mask] = Label.BUILDING
 
 
-def paste_water(image: Image, classes: Image, rng: np.random.Generator) -> None:
+def paste_water(image: Image, classes: Image, rng: Rng) -> None:
     """Paste a pond, canal or pool: a smooth shape with faint waves and glints."""
     height, side = image.shape[:2]
     size = rng.uniform(0.15, 1.0) * side
@@ -243,9 +234,7 @@ def paste_water(image: Image, classes: Image, rng: np.random.Generator) -> None:
     classes[inside] = Label.WATER
 
 
-def _crown(
-    rng: np.random.Generator, centre: NDArray[np.float64], radius: float
-) -> NDArray[np.float64]:
+def _crown(rng: Rng, centre: Points, radius: float) -> Points:
     """Return the outline of a crown: a few lobes, and raggedness that is finer."""
     angles = np.linspace(0, 2 * np.pi, 72, endpoint=False)
     wobble = np.ones(72)
@@ -262,12 +251,7 @@ def _mirrored(index: NDArray[np.int64], size: int) -> NDArray[np.int64]:
 
 
 def paste_tree(
-    image: Image,
-    classes: Image,
-    rng: np.random.Generator,
-    gsd_m: float,
-    sun: NDArray[np.float64],
-    foliage: Image,
+    image: Image, classes: Image, rng: Rng, gsd_m: float, sun: Points, foliage: Image
 ) -> None:
     """Paste a crown cut from a photograph of trees, in any season's colour, with its shadow."""
     height, side = image.shape[:2]
@@ -295,7 +279,7 @@ def paste_tree(
     classes[mask] = Label.TREE
 
 
-def paste_court(image: Image, classes: Image, rng: np.random.Generator, gsd_m: float) -> None:
+def paste_court(image: Image, classes: Image, rng: Rng, gsd_m: float) -> None:
     """Paste a painted hard court with its lines: smooth and often green, and yet paved."""
     length, width = rng.uniform(14, 40) / gsd_m, rng.uniform(8, 20) / gsd_m
     if width < 12.0:
@@ -321,7 +305,7 @@ def paste_court(image: Image, classes: Image, rng: np.random.Generator, gsd_m: f
     classes[mask] = Label.PAVED
 
 
-def _water_colour(image: Image, classes: Image, rng: np.random.Generator) -> NDArray[np.float64]:
+def _water_colour(image: Image, classes: Image, rng: Rng) -> Points:
     """Return the colour of some water, or of the plants and the ground that are in the view."""
     around = np.isin(classes, (Label.GRASS, Label.BARE_GROUND, Label.TREE))
     if rng.random() < _LIKE_GROUND and around.any():
@@ -331,9 +315,7 @@ def _water_colour(image: Image, classes: Image, rng: np.random.Generator) -> NDA
     return np.array(_jittered(rng, _WATER_COLOURS, 8)) * rng.uniform(0.7, 1.5)
 
 
-def water_texture(
-    rng: np.random.Generator, height: int, width: int, base: NDArray[np.float64]
-) -> Image:
+def water_texture(rng: Rng, height: int, width: int, base: Points) -> Image:
     """Return a water surface (uint8 RGB): one hue, slow shading, ripples, sometimes glints."""
     slow = cv2.resize(
         rng.normal(0, 1, (5, 5)).astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC
@@ -351,7 +333,7 @@ def water_texture(
     return np.asarray(np.clip(out, 0, 255), dtype=np.uint8)
 
 
-def recolour_water(image: Image, classes: Image, rng: np.random.Generator) -> None:
+def recolour_water(image: Image, classes: Image, rng: Rng) -> None:
     """Give the water of a view another colour, keeping its brightness pattern."""
     inside = classes == Label.WATER
     if not inside.any():

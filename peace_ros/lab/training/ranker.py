@@ -4,35 +4,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
-
 import numpy as np
 import torch
+from torch import Tensor
 from torch.nn import functional
 
 from peace_ros.lab.training.backbone import load_pretrained
-from peace_ros.lab.training.batches import Batch, BatchMaker
-from peace_ros.lab.training.networks import Ranker
-from peace_ros.lab.training.text import (
-    ENVIRONMENT_WORDS,
-    EXTRA_WORDS,
-    FRAME_WORDS,
-    RESOLUTION_WORDS,
-    build_tokenizer,
-    vocabulary,
-)
+from peace_ros.lab.training.batches import Batch, encode
+from peace_ros.lab.training.conditions import Condition
+from peace_ros.lab.training.networks import Pair, RankerImage
+from peace_ros.lab.training.text import CONDITION_WORDS, EXTRA_WORDS, vocabulary
 
-if TYPE_CHECKING:
-    from torch import Tensor, nn
-
-    from peace_ros.lab.training.conditions import Condition
-    from peace_ros.lab.training.sources import TrainingSource
-
-BATCH_SIZE = 24
 VIEW_PX = 224
 PEAK_RATE = 3e-3
 PRETRAINED = ('image.backbone.', 0.1)
-_SHARES = {'drawn': 0.35, 'satellite': 0.2, 'drone': 0.45}
+SHARES = {'drawn': 0.35, 'satellite': 0.2, 'drone': 0.45}
 
 _PLAIN_WORDS = (
     'blurry', 'foggy', 'mist', 'misty', 'haze', 'hazy', 'snow', 'rain', 'wet', 'dusk', 'dawn',
@@ -53,60 +39,36 @@ _PHRASES = (
 )  # fmt: skip
 
 
-def create_ranker(seed: int) -> Ranker:
-    """Return a ranker that knows ImageNet; its other weights follow from the seed."""
+def create_ranker(seed: int) -> Pair:
+    """Return a pair that starts from ImageNet; its other weights follow from the seed."""
     torch.manual_seed(seed + 1)
-    model = Ranker(len(vocabulary()))
-    load_pretrained(model.image.backbone)
+    image = RankerImage()
+    model = Pair(image, len(vocabulary()), most_scale=30.0)
+    load_pretrained(image.backbone)
     return model
-
-
-def create_maker(
-    sources: list[TrainingSource],
-    seed: int,
-    *,
-    batch_size: int = BATCH_SIZE,
-    view_px: int = VIEW_PX,
-) -> BatchMaker:
-    """Return the batches of the ranker: three of four views under a look, no prompts."""
-    groups = [
-        (share, [source for source in sources if source.kind == kind])
-        for kind, share in _SHARES.items()
-    ]
-    return BatchMaker(
-        groups, seed=seed + 1, batch_size=batch_size, view_px=view_px, prompts=0,
-        condition_chance=0.75,
-    )  # fmt: skip
 
 
 class RankerLoss:
     """Contrastive loss over the words of each category, and of all looks together."""
 
     def __init__(self, seed: int) -> None:
-        if not set(_PLAIN_WORDS) <= set(EXTRA_WORDS):
+        if not set(_PLAIN_WORDS) <= set(EXTRA_WORDS.split()):
             raise ValueError('plain words must be part of the vocabulary')
         self._rng = np.random.default_rng([seed, 5])
-        self._tokenizer = build_tokenizer()
 
-    def __call__(self, model: nn.Module, batch: Batch) -> dict[str, Tensor]:
-        """Sum the categories."""
-        ranker = cast('Ranker', model)
+    def __call__(self, ranker: Pair, batch: Batch) -> dict[str, Tensor]:
+        """Return the loss of each category."""
         image = ranker.image(batch.pixels)
-        scale = ranker.log_scale.exp().clamp(max=30.0)
+        scale = ranker.scale()
         conditions = [view.condition for view in batch.views]
         losses = {}
-        for name, words in (
-            ('resolution', RESOLUTION_WORDS),
-            ('frame', FRAME_WORDS),
-            ('environment', ENVIRONMENT_WORDS + _PLAIN_WORDS),
-            ('look', _LOOK_WORDS),
-        ):
+        for name, words in {
+            **CONDITION_WORDS,
+            'environment': CONDITION_WORDS['environment'] + _PLAIN_WORDS,
+            'look': _LOOK_WORDS,
+        }.items():
             phrase = _PHRASES[int(self._rng.integers(len(_PHRASES)))]
-            encoded = self._tokenizer.encode_batch([phrase.format(word) for word in words])
-            text = ranker.text(
-                torch.tensor([each.ids for each in encoded]),
-                torch.tensor([each.attention_mask for each in encoded]),
-            )
+            text = ranker.text(*encode([phrase.format(word) for word in words]))
             similar = scale * image @ text.T
             losses[name] = _several_true(similar, _truth(conditions, name, words))
         return losses

@@ -4,30 +4,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 import torch
+from torch import Tensor
 from torch.nn import functional
 
 from peace_ros.lab.training.backbone import load_pretrained
-from peace_ros.lab.training.batches import LABEL_COUNT, Batch, BatchMaker, pixel_class_table
+from peace_ros.lab.training.batches import Batch, encode, pixel_class_table, wanted_labels
 from peace_ros.lab.training.losses import class_loss, class_weights, prompt_loss, shares
 from peace_ros.lab.training.networks import SegmenterNetwork
-from peace_ros.lab.training.text import build_tokenizer, sample_prompt, vocabulary
-
-if TYPE_CHECKING:
-    from torch import Tensor, nn
-
-    from peace_ros.lab.training.sources import TrainingSource
+from peace_ros.lab.training.text import sample_prompt, vocabulary
 
 BATCH_SIZE = 8
 VIEW_PX = 320
 PROMPTS = 6
 PEAK_RATE = 2e-3
 PRETRAINED = ('encoder.backbone.', 0.25)
-"""What was learned on ImageNet is changed with care: at this part of the rate."""
-_SHARES = {'drawn': 0.42, 'satellite': 0.2, 'drone': 0.38}
+"""What was learned on ImageNet changes slowly: at this part of the rate."""
+SHARES = {'drawn': 0.42, 'satellite': 0.2, 'drone': 0.38}
 
 
 def create_segmenter(seed: int) -> SegmenterNetwork:
@@ -51,7 +47,6 @@ def teach_text(
     threads = torch.get_num_threads()
     # Products this small lose more to waiting for each other than they win.
     torch.set_num_threads(1)
-    tokenizer = build_tokenizer()
     parameters = [*model.text.parameters(), *model.decoder.meaning.parameters()]
     optimiser = torch.optim.AdamW(parameters, lr=5e-3, weight_decay=1e-3)
     last = 0.0
@@ -59,38 +54,16 @@ def teach_text(
         for group in optimiser.param_groups:
             group['lr'] = 5e-3 * (1.0 - 0.95 * step / steps)
         prompts = [sample_prompt(rng) for _ in range(batch_size)]
-        encoded = tokenizer.encode_batch([prompt.text for prompt in prompts])
-        wanted = torch.zeros(batch_size, LABEL_COUNT)
-        for row, prompt in enumerate(prompts):
-            for label in prompt.labels:
-                wanted[row, label - 1] = 1.0
-        ids = torch.tensor([each.ids for each in encoded])
-        mask = torch.tensor([each.attention_mask for each in encoded])
-        logits = model.decoder.meaning_logits(model.text(ids, mask))
-        loss = functional.binary_cross_entropy_with_logits(logits, wanted)
+        texts = model.text(*encode([prompt.text for prompt in prompts]))
+        loss = functional.binary_cross_entropy_with_logits(
+            model.decoder.meaning_logits(texts), wanted_labels(prompts)
+        )
         optimiser.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         optimiser.step()
         last = loss.item()
     torch.set_num_threads(threads)
     return last
-
-
-def create_maker(
-    sources: list[TrainingSource],
-    seed: int,
-    *,
-    batch_size: int = BATCH_SIZE,
-    view_px: int = VIEW_PX,
-) -> BatchMaker:
-    """Return the batches of the segmenter: drawn scenes, and more real images where given."""
-    groups = [
-        (share, [source for source in sources if source.kind == kind])
-        for kind, share in _SHARES.items()
-    ]
-    return BatchMaker(
-        groups, seed=seed, batch_size=batch_size, view_px=view_px, prompts=PROMPTS
-    )  # fmt: skip
 
 
 class SegmenterLoss:
@@ -100,9 +73,8 @@ class SegmenterLoss:
         self._table = pixel_class_table()
         self._weights = class_weights()
 
-    def __call__(self, model: nn.Module, batch: Batch) -> dict[str, Tensor]:
+    def __call__(self, segmenter: SegmenterNetwork, batch: Batch) -> dict[str, Tensor]:
         """Run the network in bfloat16 where the processor has it, the losses in float32."""
-        segmenter = cast('SegmenterNetwork', model)
         with torch.autocast('cpu', dtype=torch.bfloat16):
             features = segmenter.encoder(batch.pixels)
         features = features.float()

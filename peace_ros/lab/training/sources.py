@@ -5,23 +5,20 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
 from peace_ros.core.domain import Label, WorldError
-from peace_ros.lab.training.annotations import VEGETATION, load_annotations, rasterise
+from peace_ros.lab.training.annotations import VEGETATION, Annotation, load_annotations, rasterise
+from peace_ros.lab.training.arrays import Image
 from peace_ros.simulation.drawing import draw_scene
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
 
 FRAME_PX = 352
 """Side of the segmenter's input; frame sides below are given for it."""
@@ -29,7 +26,7 @@ SCENE_PX = 512
 GSD_RANGE_M = (0.02, 0.5)
 """A 73 degree view of 352 px from 5 m to 120 m height."""
 _BUILT_UP = ('suburb', 'city', 'village', 'park', 'riverside', 'industrial')
-"""Layouts with most to tell apart; two scenes in five are made one of these."""
+"""Layouts with the most classes; two scenes in five have one of these."""
 VALIDATION_SEED = 10_000_000
 """Scenes with seeds from here on are never trained on."""
 
@@ -41,8 +38,8 @@ class TrainingSource:
     name: str
     kind: str
     """``drawn``, ``satellite`` or ``drone``."""
-    images_rgb: tuple[NDArray[np.uint8], ...]
-    classes: tuple[NDArray[np.uint8], ...]
+    images_rgb: tuple[Image, ...]
+    classes: tuple[Image, ...]
     """Labels or partial classes, uint8."""
     gsd_m: float
     """Of the largest size; for real images an estimate that only sizes pasted things."""
@@ -56,8 +53,8 @@ class TrainingSource:
 def build_source(
     name: str,
     kind: str,
-    image_rgb: NDArray[np.uint8],
-    classes: NDArray[np.uint8],
+    image_rgb: Image,
+    classes: Image,
     gsd_m: float,
     frame_side_px: tuple[float, float],
     season: str = '',
@@ -79,66 +76,62 @@ def build_source(
 _DUBAI = 'Semantic segmentation of aerial imagery, Humans in the Loop with MBRSC (CC0-1.0)'
 
 
-def _read(path: Path, flag: int) -> NDArray[np.uint8]:
+def read_image(path: Path, flag: int = cv2.IMREAD_COLOR) -> Image:
+    """Return an image, RGB or as the flag of OpenCV says; raises WorldError."""
     image = cv2.imread(str(path), flag)
     if image is None:
-        raise WorldError(f'{path}: cannot be read as an image; check the path given with --real')
+        raise WorldError(f'{path}: cannot be read as an image; download it again')
     if flag == cv2.IMREAD_COLOR:
         image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
     return np.ascontiguousarray(image, dtype=np.uint8)
 
 
-def load_dubai(folder: Path, split: str) -> list[TrainingSource]:
-    """Load the labelled satellite tiles of one split (``train`` or ``val``) of manifest.csv.
+def load_dubai(folder: Path) -> list[TrainingSource]:
+    """Load the labelled satellite tiles of manifest.csv whose split is ``train``.
 
     Their vegetation class mixes lawn and trees, so it becomes the partial class of both.
     """
     sources = []
     with (folder / 'manifest.csv').open(newline='') as file:
-        rows = [row for row in csv.DictReader(file) if row['split'] == split]
+        rows = [row for row in csv.DictReader(file) if row['split'] == 'train']
     for row in rows:
-        classes = _read(folder / row['label'], cv2.IMREAD_GRAYSCALE)
+        classes = read_image(folder / row['label'], cv2.IMREAD_GRAYSCALE)
         classes[classes == Label.GRASS] = VEGETATION
-        image = _read(folder / row['image'], cv2.IMREAD_COLOR)
+        image = read_image(folder / row['image'])
         side = float(min(image.shape[:2]))
         sources.append(
             build_source(
-                row['image'],
-                'satellite',
-                image,
-                classes,
-                0.35,
-                (90.0, 1.1 * side),
-                origin=_DUBAI,
+                row['image'], 'satellite', image, classes, 0.35, (90.0, 1.1 * side), origin=_DUBAI
             )
         )
     return sources
+
+
+def annotated_photographs(folder: Path, *, is_validation: bool) -> list[tuple[Annotation, Path]]:
+    """Return those that lie in ``ortho`` of the folder, kept for validation or not."""
+    paths = [(each, folder / 'ortho' / f'{each.name}.jpg') for each in load_annotations()]
+    return [
+        (each, path)
+        for each, path in paths
+        if each.is_validation == is_validation and path.is_file()
+    ]
 
 
 def load_drone(folder: Path) -> list[TrainingSource]:
     """Load the annotated photographs that lie in ``ortho`` of the folder, with our polygons.
 
     Those kept for validation are left out. All are under licences that allow derived weights.
-    What is not there is left out too: the pictures come from many places, and a run tells in its
-    provenance which ones it had.
+    Missing pictures are left out: they come from many places, and the provenance lists the sources
+    of those that a run had.
     """
     sources = []
-    for annotation in load_annotations():
-        path = folder / 'ortho' / f'{annotation.name}.jpg'
-        if annotation.is_validation or not path.is_file():
-            continue
-        image = _read(path, cv2.IMREAD_COLOR)
+    for annotation, path in annotated_photographs(folder, is_validation=False):
+        image = read_image(path)
         classes = rasterise(annotation, image.shape[1], image.shape[0])
+        origin = f'{annotation.origin} ({annotation.licence})'
+        frame, gsd_m = annotation.frame_px, annotation.gsd_m
         sources.append(
-            build_source(
-                annotation.name,
-                'drone',
-                image,
-                classes,
-                annotation.gsd_m,
-                annotation.frame_px,
-                origin=f'{annotation.origin} ({annotation.licence})',
-            )
+            build_source(annotation.name, 'drone', image, classes, gsd_m, frame, origin=origin)
         )
     return sources
 
@@ -147,7 +140,7 @@ def load_real(folder: Path | None) -> list[TrainingSource]:
     """Load every real image that may be trained on; none when no folder is given."""
     if folder is None:
         return []
-    return load_dubai(folder, 'train') + load_drone(folder)
+    return load_dubai(folder) + load_drone(folder)
 
 
 def credits_of(sources: list[TrainingSource]) -> str:
@@ -158,8 +151,7 @@ def credits_of(sources: list[TrainingSource]) -> str:
     return f' and {len(real)} real images: {", ".join(sorted({each.origin for each in real}))}'
 
 
-def _cached_scene(job: tuple[str, int, int]) -> None:
-    path, seed, size_px = job
+def _draw_scene(path: Path, seed: int, size_px: int) -> None:
     cv2.setNumThreads(1)
     rng = np.random.default_rng([seed, 77])
     low, high = np.log(GSD_RANGE_M[0]), np.log(GSD_RANGE_M[1])
@@ -169,16 +161,13 @@ def _cached_scene(job: tuple[str, int, int]) -> None:
     if seed >= VALIDATION_SEED:
         layout = None
     scene = draw_scene(seed, size_px, gsd_m, layout=layout)
-    partial = f'{path}.part.npz'
+    unfinished = path.with_suffix('.part.npz')
     np.savez(
-        partial,
-        image=scene.image_rgb,
-        labels=scene.labels,
-        gsd_m=scene.gsd_m,
+        unfinished, image=scene.image_rgb, labels=scene.labels, gsd_m=scene.gsd_m,
         season=str(scene.season),
-    )
+    )  # fmt: skip
     # Only whole files carry the final name, also when the process is killed.
-    Path(partial).replace(path)
+    unfinished.replace(path)
 
 
 def load_drawn(
@@ -196,20 +185,17 @@ def load_drawn(
     """
     cache.mkdir(parents=True, exist_ok=True)
     paths = [cache / f'scene_{seed}_{size_px}.npz' for seed in seeds]
-    jobs = [
-        (str(path), seed, size_px)
-        for path, seed in zip(paths, seeds, strict=True)
-        if not path.exists()
-    ]
+    jobs = [(path, seed) for path, seed in zip(paths, seeds, strict=True) if not path.exists()]
+    draw = partial(_draw_scene, size_px=size_px)
     if jobs and workers > 1:
         # Not by forking: threads of torch or of a test runner may hold locks, which stay held.
         with ProcessPoolExecutor(workers, get_context('spawn')) as pool:
-            for done, _ in enumerate(pool.map(_cached_scene, jobs, chunksize=4)):
+            for done, _ in enumerate(pool.map(draw, *zip(*jobs, strict=True), chunksize=4)):
                 if report is not None:
                     report(len(paths) - len(jobs) + done + 1)
     else:
-        for job in jobs:
-            _cached_scene(job)
+        for path, seed in jobs:
+            draw(path, seed)
     return [_load_scene(path) for path in paths]
 
 

@@ -1,29 +1,24 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Going on from a bundle that an earlier training has written, in place of ImageNet's weights."""
+"""Continuing from a bundle that an earlier training wrote, in place of ImageNet's weights."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from collections.abc import Iterable
+from pathlib import Path
+from typing import cast
 
 import numpy as np
 import onnx
 import torch
 from onnx import numpy_helper
 from tokenizers import Tokenizer
-from torch import nn
+from torch import Tensor, nn
 
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.inference import Bundle
+from peace_ros.lab.training.networks import SegmenterNetwork
 from peace_ros.lab.training.text import build_tokenizer
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
-
-    from torch import Tensor
-
-    from peace_ros.lab.training.networks import SegmenterNetwork
 
 Arrays = dict[str, np.ndarray]
 
@@ -40,7 +35,7 @@ def start_from(model: SegmenterNetwork, folder: Path, pixels: Iterable[Tensor]) 
 
     A bundle holds each convolution with its batch norm folded into it. Here the norms are given the
     spreads that the ``pixels`` (float32 [B, 3, H, W], normalised) cause, and the gains and shifts
-    that undo them: the network computes what the bundle does, and goes on learning from there.
+    that undo them: the network computes what the bundle does, and continues to learn from there.
 
     Raises:
         BundleError: the bundle is not whole.
@@ -97,22 +92,18 @@ def _pairs(encoder: nn.Module) -> list[tuple[nn.Conv2d, nn.BatchNorm2d]]:
         encoder.eval()(torch.zeros(1, 3, 64, 64))
     for hook in hooks:
         hook.remove()
-    return [
-        (cast('nn.Conv2d', one), cast('nn.BatchNorm2d', other))
-        for one, other in zip(ran[::2], ran[1::2], strict=True)
-    ]
+    return cast(
+        'list[tuple[nn.Conv2d, nn.BatchNorm2d]]', list(zip(ran[::2], ran[1::2], strict=True))
+    )
 
 
 def _fill_encoder(encoder: nn.Module, path: Path) -> None:
     graph = onnx.load(str(path))
     arrays = _arrays(graph)
-    given = [
-        (arrays[node.input[1].removesuffix('_half')], arrays[node.input[2].removesuffix('_half')])
-        for node in graph.graph.node
-        if node.op_type == 'Conv'
-    ]
+    nodes = [node for node in graph.graph.node if node.op_type == 'Conv']
     with torch.no_grad():
-        for (convolution, norm), (weight, bias) in zip(_pairs(encoder), given, strict=True):
+        for (convolution, norm), node in zip(_pairs(encoder), nodes, strict=True):
+            weight, bias = (arrays[name.removesuffix('_half')] for name in node.input[1:])
             convolution.weight.copy_(torch.from_numpy(weight))
             norm.weight.fill_(1.0)
             norm.bias.copy_(torch.from_numpy(bias))

@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import asdict, dataclass
+from functools import cache
 
 import numpy as np
 from tokenizers import Regex, Tokenizer, normalizers, pre_tokenizers
@@ -14,154 +14,91 @@ from tokenizers.models import WordLevel
 from tokenizers.processors import TemplateProcessing
 
 from peace_ros.core.domain import Label
+from peace_ros.core.prompting import load_vocabularies
+from peace_ros.lab.training.arrays import Rng
 
 CONTEXT_LENGTH = 32
 PAD, UNKNOWN, START = '[PAD]', '[UNK]', '[CLS]'
 
-_OPEN = frozenset({Label.GRASS, Label.BARE_GROUND})
 
-TERMS: tuple[tuple[frozenset[Label], str], ...] = (
-    (
-        frozenset({Label.GRASS}),
-        (
-            'grass; dead grass; dry grass; tall grass; short grass; lawn; lawns; green lawn; '
-            'meadow; pasture; turf; garden; gardens; yard; backyard; frontyard; back yard; '
-            'front yard; courtyard; park; park lawn; sports-field; sports field; football '
-            'field; soccer field; golf course; pitch; low vegetation; vegetation; vegetable '
-            'garden; green space; clover; crop; crops; hay; grassland; playground; green '
-            'field; mown grass'
-        ),
-    ),
-    (
-        _OPEN,
-        (
-            'field; fields; farm field; agricultural land; farmland; open-area; open area; '
-            'open-space; open space; open field; open ground; flat ground; clearing; soft '
-            'ground; ground; landing zone; landing site; safe landing area; safe place to '
-            'land; empty field; land'
-        ),
-    ),
-    (
-        frozenset({Label.BARE_GROUND}),
-        (
-            'bare ground; bare soil; soil; dirt; bare earth; earth; sand; gravel; mud; '
-            'desert; beach; dirt field; ploughed field; plowed field; fallow field; stubble; '
-            'dust; clay; sandy ground; rocky ground; dry ground; dunes'
-        ),
-    ),
-    (
-        frozenset({Label.PAVED}),
-        (
-            'road; roads; street; streets; avenue; highway; drive; driveway; lane; sidewalk; '
-            'pavement; parking lot; parking; car park; asphalt; concrete; concrete floor; '
-            'tarmac; motorway; freeway; path; footpath; walkway; crosswalk; zebra crossing; '
-            'junction; crossroads; roundabout; intersection; runway; plaza; square; bridge; '
-            'road marking; paved ground; paved area; patio; stairs; steps; footsteps; bike '
-            'lane; railway; railroad; train tracks'
-        ),
-    ),
-    (
-        frozenset({Label.BUILDING}),
-        (
-            'building; buildings; house; houses; apartment-building; apartment; apartments; '
-            'warehouse; shed; garage; roof; roofs; rooftop; terrace; shelter; dome; canopy; '
-            'ceiling; hut; barn; factory; skyscraper; tower; church; school; villa; home; '
-            'hangar; greenhouse; tile roof; flat roof; office; hall; cabin; structure'
-        ),
-    ),
-    (
-        frozenset({Label.TREE}),
-        (
-            'tree; trees; bare tree; tree during autumn; bush; bushes; tall-plant; tall '
-            'plant; forest; woods; wood; shrub; shrubs; hedge; tree canopy; tree crown; palm; '
-            'palm tree; conifer; pine; branches; foliage; orchard; thicket; leafless tree'
-        ),
-    ),
-    (
-        frozenset({Label.WATER}),
-        (
-            'water; lake; river; swimming pool; pool; pond; sea; ocean; canal; stream; '
-            'puddle; fountain; water surface; flood; harbour; harbor; bay; wetland; swamp; '
-            'reservoir'
-        ),
-    ),
-    (
-        frozenset({Label.VEHICLE}),
-        (
-            'vehicle; vehicles; car; cars; truck; trucks; train; bus; buses; van; lorry; '
-            'parked car; moving car; motorcycle; motorbike; bicycle; bike; tractor; trailer; '
-            'caravan; boat; ship; traffic; automobile; machine; tram'
-        ),
-    ),
-    (
-        frozenset({Label.PERSON}),
-        (
-            'person; people; crowd; pedestrian; pedestrians; human; humans; man; woman; '
-            'child; children; cyclist; someone; worker; group of people; runner; player; '
-            'animal; dog'
-        ),
-    ),
-    (
-        frozenset({Label.OBSTACLE}),
-        (
-            'fence; wall; lamp-post; lamp post; transmission-line; transmission line; power '
-            'line; pole; poles; pylon; container; containers; obstacle; obstacles; antenna; '
-            'mast; wire; cable; bench; rock; rocks; stone; boulder; goal; debris; pipe; '
-            'barrier; railing; sign; silo; tank; street light; crane; scaffold; electric '
-            'tower; lamp; log; bale'
-        ),
-    ),
-    (frozenset({Label.OBSTACLE, Label.TREE}), 'hedgerow; vegetation obstacle'),
-    (
-        frozenset(Label) - _OPEN - {Label.UNLABELED},
-        'hazard; hazards; danger; dangerous area; unsafe area; unsafe ground; unsafe place',
-    ),
-)
-"""Labels that a term stands for, and the terms, parted by semicolons."""
+def _table(text: str) -> tuple[tuple[frozenset[Label], str], ...]:
+    """Read lines of ``LABEL ...: words``; an indented line continues the one before."""
+    rows = []
+    for line in text.strip().replace('\n  ', ' ').splitlines():
+        names, _, words = line.partition(': ')
+        rows.append((frozenset(Label[name] for name in names.split()), words))
+    return tuple(rows)
 
-GROUPS: tuple[tuple[frozenset[Label], str], ...] = (
-    (
-        frozenset({Label.BUILDING}),
-        'building, house, apartment-building, warehouse, shed, garage',
-    ),
-    (frozenset({Label.BUILDING}), 'roof, rooftop, terrace, shelter, dome, canopy, ceiling'),
-    (frozenset({Label.TREE}), 'tree, bare tree, tree during autumn, bush, tall-plant'),
-    (frozenset({Label.WATER}), 'water, lake, river, swimming pool'),
-    (frozenset({Label.PERSON}), 'people, crowd'),
-    (frozenset({Label.VEHICLE}), 'vehicle, car, train'),
-    (frozenset({Label.OBSTACLE}), 'lamp-post, transmission-line'),
-    (frozenset({Label.OBSTACLE}), 'fence, wall, hedgerow'),
-    (frozenset({Label.PAVED}), 'road, street, avenue, highway, drive, lane'),
-    (frozenset({Label.PAVED}), 'stairs, steps, footsteps'),
-    (frozenset({Label.GRASS}), 'grass, dead grass, backyard, frontyard, courtyard, lawn'),
-    (_OPEN, 'sports-field, park, open-area, open-space, agricultural land'),
-    (
-        frozenset({Label.PAVED, Label.BARE_GROUND}),
-        'parking lot, sidewalk, gravel, dirt, sand, concrete floor, asphalt',
-    ),
-)
+
+TERMS = _table("""
+GRASS: grass; dead grass; dry grass; tall grass; short grass; lawn; lawns; green lawn; meadow;
+  pasture; turf; garden; gardens; yard; backyard; frontyard; back yard; front yard; courtyard;
+  park; park lawn; sports-field; sports field; football field; soccer field; golf course; pitch;
+  low vegetation; vegetation; vegetable garden; green space; clover; crop; crops; hay; grassland;
+  playground; green field; mown grass
+GRASS BARE_GROUND: field; fields; farm field; agricultural land; farmland; open-area; open area;
+  open-space; open space; open field; open ground; flat ground; clearing; soft ground; ground;
+  landing zone; landing site; safe landing area; safe place to land; empty field; land
+BARE_GROUND: bare ground; bare soil; soil; dirt; bare earth; earth; sand; gravel; mud; desert;
+  beach; dirt field; ploughed field; plowed field; fallow field; stubble; dust; clay; sandy
+  ground; rocky ground; dry ground; dunes
+PAVED: road; roads; street; streets; avenue; highway; drive; driveway; lane; sidewalk; pavement;
+  parking lot; parking; car park; asphalt; concrete; concrete floor; tarmac; motorway; freeway;
+  path; footpath; walkway; crosswalk; zebra crossing; junction; crossroads; roundabout;
+  intersection; runway; plaza; square; bridge; road marking; paved ground; paved area; patio;
+  stairs; steps; footsteps; bike lane; railway; railroad; train tracks
+BUILDING: building; buildings; house; houses; apartment-building; apartment; apartments;
+  warehouse; shed; garage; roof; roofs; rooftop; terrace; shelter; dome; canopy; ceiling; hut;
+  barn; factory; skyscraper; tower; church; school; villa; home; hangar; greenhouse; tile roof;
+  flat roof; office; hall; cabin; structure
+TREE: tree; trees; bare tree; tree during autumn; bush; bushes; tall-plant; tall plant; forest;
+  woods; wood; shrub; shrubs; hedge; tree canopy; tree crown; palm; palm tree; conifer; pine;
+  branches; foliage; orchard; thicket; leafless tree
+WATER: water; lake; river; swimming pool; pool; pond; sea; ocean; canal; stream; puddle; fountain;
+  water surface; flood; harbour; harbor; bay; wetland; swamp; reservoir
+VEHICLE: vehicle; vehicles; car; cars; truck; trucks; train; bus; buses; van; lorry; parked car;
+  moving car; motorcycle; motorbike; bicycle; bike; tractor; trailer; caravan; boat; ship;
+  traffic; automobile; machine; tram
+PERSON: person; people; crowd; pedestrian; pedestrians; human; humans; man; woman; child;
+  children; cyclist; someone; worker; group of people; runner; player; animal; dog
+OBSTACLE: fence; wall; lamp-post; lamp post; transmission-line; transmission line; power line;
+  pole; poles; pylon; container; containers; obstacle; obstacles; antenna; mast; wire; cable;
+  bench; rock; rocks; stone; boulder; goal; debris; pipe; barrier; railing; sign; silo; tank;
+  street light; crane; scaffold; electric tower; lamp; log; bale
+TREE OBSTACLE: hedgerow; vegetation obstacle
+PAVED BUILDING TREE WATER VEHICLE PERSON OBSTACLE: hazard; hazards; danger; dangerous area;
+  unsafe area; unsafe ground; unsafe place
+""")
+"""Labels that a term stands for, and the terms, separated by semicolons."""
+
+GROUPS = _table("""
+BUILDING: building, house, apartment-building, warehouse, shed, garage
+BUILDING: roof, rooftop, terrace, shelter, dome, canopy, ceiling
+TREE: tree, bare tree, tree during autumn, bush, tall-plant
+WATER: water, lake, river, swimming pool
+PERSON: people, crowd
+VEHICLE: vehicle, car, train
+OBSTACLE: lamp-post, transmission-line
+OBSTACLE: fence, wall, hedgerow
+PAVED: road, street, avenue, highway, drive, lane
+PAVED: stairs, steps, footsteps
+GRASS: grass, dead grass, backyard, frontyard, courtyard, lawn
+GRASS BARE_GROUND: sports-field, park, open-area, open-space, agricultural land
+BARE_GROUND PAVED: parking lot, sidewalk, gravel, dirt, sand, concrete floor, asphalt
+""")
 """The groups of the DOVESEI system: each is one prompt."""
 
-RESOLUTION_WORDS = ('3D', '3D rendered', 'rendered', 'blurred')
-FRAME_WORDS = (
-    'picture', 'screen', 'drawing', 'art', 'artwork', 'painting', 'illustration', 'image', 'view',
-    'animation', 'game', 'cartoon', 'manga', 'film', 'scene', 'scenery', 'movie', 'screenshot',
-)  # fmt: skip
-ENVIRONMENT_WORDS = (
-    'summer', 'winter', 'autumn', 'spring', 'heat', 'heat-map', 'map', 'piece', 'morning',
-    'afternoon', 'evening', 'night', 'bright', 'dark', 'sunny', 'rainy', 'cloudy', 'snowy',
-    'smog', 'fog', 'damp',
-)  # fmt: skip
+CONDITION_WORDS = asdict(load_vocabularies())
+"""Category (resolution, frame, environment) -> the words of the package for it."""
 EXTRA_WORDS = (
-    'good', 'bad', 'blurry', 'sharp', 'clear', 'noisy', 'photo', 'photograph', 'foggy', 'rain',
-    'snow', 'day', 'daylight', 'dusk', 'dawn', 'shade', 'shadow', 'shadows', 'graphics', 'aerial',
-    'satellite', 'drone', 'top', 'high', 'low', 'altitude', 'hazy', 'misty', 'mist', 'haze', 'wet',
-    'dry', 'overcast', 'gloomy', 'noise', 'grainy', 'realistic', 'real', 'synthetic', 'simulated',
-    'simulation', 'frame', 'camera', 'video', 'quality', 'resolution', 'weather', 'season', 'a',
-    'an', 'the', 'of', 'in', 'from', 'above', 'at', 'on', 'and', 'or', 'with', 'is', 'this', 'some',
-    'small', 'big', 'large', 'many', 'near', 'next', 'to', 'color', 'colour', 'green', 'brown',
-    'grey', 'gray', 'white', 'black', 'red', 'blue', 'yellow', 'dirty', 'clean', 'empty',
-)  # fmt: skip
+    'good bad blurry sharp clear noisy photo photograph foggy rain snow day daylight dusk dawn '
+    'shade shadow shadows graphics aerial satellite drone top high low altitude hazy misty mist '
+    'haze wet dry overcast gloomy noise grainy realistic real synthetic simulated simulation '
+    'frame camera video quality resolution weather season a an the of in from above at on and or '
+    'with is this some small big large many near next to color colour green brown grey gray white '
+    'black red blue yellow dirty clean empty'
+)
+"""Further words that texts may hold."""
 
 TEMPLATES = (
     'A photo of {term}.',
@@ -183,12 +120,13 @@ def words_of(text: str) -> list[str]:
 def vocabulary() -> tuple[str, ...]:
     """Return every known token, special ones first; its order is the order of the ids."""
     texts = [terms for _, terms in TERMS + GROUPS]
-    texts += [*RESOLUTION_WORDS, *FRAME_WORDS, *ENVIRONMENT_WORDS, *EXTRA_WORDS]
+    texts += [EXTRA_WORDS, *(word for words in CONDITION_WORDS.values() for word in words)]
     texts += [re.sub(r'\{\w+\}', ' ', template) for template in TEMPLATES]
     known = sorted({word for text in texts for word in words_of(text)})
     return (PAD, UNKNOWN, START, *known)
 
 
+@cache
 def build_tokenizer() -> Tokenizer:
     """Return the word-level tokenizer: lower-case, punctuation dropped, padded to the longest."""
     ids = {word: index for index, word in enumerate(vocabulary())}
@@ -203,11 +141,6 @@ def build_tokenizer() -> Tokenizer:
     tokenizer.enable_truncation(CONTEXT_LENGTH)
     tokenizer.enable_padding(pad_id=ids[PAD], pad_token=PAD)
     return tokenizer
-
-
-def save_tokenizer(path: Path) -> None:
-    """Write ``tokenizer.json``."""
-    build_tokenizer().save(str(path))
 
 
 @dataclass(frozen=True)
@@ -231,11 +164,11 @@ _GROUP_CHANCES = np.array([2.2, 1.6, 1.6, 1.8, 1.5, 1.5, 1.3, 1.3, 1.3, 1.3, 0.3
 _GROUP_CHANCES = _GROUP_CHANCES / _GROUP_CHANCES.sum()
 
 
-def _pick(rng: np.random.Generator, words: tuple[str, ...]) -> str:
+def _pick(rng: Rng, words: tuple[str, ...]) -> str:
     return words[int(rng.integers(len(words)))]
 
 
-def sample_term(rng: np.random.Generator) -> TermPrompt:
+def sample_term(rng: Rng) -> TermPrompt:
     """Draw a term: one word, several of one meaning, a released group, a mixture or nonsense."""
     kind = rng.random()
     if kind < 0.2:
@@ -244,7 +177,7 @@ def sample_term(rng: np.random.Generator) -> TermPrompt:
     group = int(rng.choice(len(TERMS), p=_GROUP_CHANCES))
     labels, first = TERMS[group][0], _BY_GROUP[group]
     if kind < 0.68:
-        # The first word of a group is the one most often asked for.
+        # The first word of a group is the most frequent one in prompts.
         return TermPrompt(first[0] if rng.random() < 0.25 else _pick(rng, first), labels)
     if kind < 0.84:
         count = min(len(first), int(rng.integers(2, 6)))
@@ -258,7 +191,7 @@ def sample_term(rng: np.random.Generator) -> TermPrompt:
 
 
 def sample_prompt(
-    rng: np.random.Generator, condition_words: tuple[tuple[str, ...], ...] | None = None
+    rng: Rng, condition_words: tuple[tuple[str, ...], ...] | None = None
 ) -> TermPrompt:
     """Draw a full prompt.
 
@@ -268,9 +201,7 @@ def sample_prompt(
     term = sample_term(rng)
     template = TEMPLATES[int(rng.choice(len(TEMPLATES), p=_TEMPLATE_CHANCES))]
     slots: dict[str, str] = {}
-    names = ('resolution', 'frame', 'environment')
-    everything = (RESOLUTION_WORDS, FRAME_WORDS, ENVIRONMENT_WORDS)
-    for index, (name, words) in enumerate(zip(names, everything, strict=True)):
+    for index, (name, words) in enumerate(CONDITION_WORDS.items()):
         true = condition_words[index] if condition_words is not None else ()
         slots[name] = _pick(rng, true if true and rng.random() < 0.8 else words)
     return TermPrompt(template.format(term=term.text, **slots), term.labels)

@@ -4,20 +4,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from peace_ros.core.domain import Label
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from peace_ros.lab.training.sources import TrainingSource
+from peace_ros.lab.training.arrays import Image, Rng
+from peace_ros.lab.training.sources import TrainingSource
 
 _GROUND = (Label.GRASS, Label.BARE_GROUND, Label.PAVED, Label.WATER)
 _SIDE_PX = (48, 128)
@@ -29,16 +25,16 @@ _SHADE_PX = 4.0
 class Materials:
     """Textures by label, and looks as mean and spread in CIELAB, cut out of real images."""
 
-    textures: dict[Label, tuple[NDArray[np.uint8], ...]] = field(default_factory=dict)
+    textures: dict[Label, tuple[Image, ...]] = field(default_factory=dict)
     looks: tuple[tuple[NDArray[np.float32], NDArray[np.float32]], ...] = ()
 
 
 NO_MATERIALS = Materials()
 
 
-def gather_materials(sources: Sequence[TrainingSource], rng: np.random.Generator) -> Materials:
+def gather_materials(sources: Sequence[TrainingSource], rng: Rng) -> Materials:
     """Cut squares that hold nothing but one label, and note the colours of any squares."""
-    textures: dict[Label, list[NDArray[np.uint8]]] = {}
+    textures: dict[Label, list[Image]] = {}
     looks = []
     for source in sources:
         if source.kind == 'drawn':
@@ -57,18 +53,13 @@ def gather_materials(sources: Sequence[TrainingSource], rng: np.random.Generator
     return Materials({key: tuple(value) for key, value in textures.items()}, tuple(looks))
 
 
-def _look(image_rgb: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _look(image_rgb: Image) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     small = cv2.resize(image_rgb, (64, 64), interpolation=cv2.INTER_AREA)
     lab = cv2.cvtColor(small, cv2.COLOR_RGB2LAB).reshape(-1, 3).astype(np.float32)
     return lab.mean(axis=0), lab.std(axis=0) + 1.0
 
 
-def cover(
-    image: NDArray[np.uint8],
-    classes: NDArray[np.uint8],
-    rng: np.random.Generator,
-    materials: Materials,
-) -> NDArray[np.uint8]:
+def cover(image: Image, classes: Image, rng: Rng, materials: Materials) -> Image:
     """Lay real textures over the ground of a drawn view; its light and shadows stay."""
     out = image.astype(np.float32)
     shade = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), (0, 0), _SHADE_PX)
@@ -86,9 +77,7 @@ def cover(
     return np.clip(out, 0.0, 255.0).astype(np.uint8)
 
 
-def _tiled(
-    texture: NDArray[np.uint8], rng: np.random.Generator, size_px: int
-) -> NDArray[np.float32]:
+def _tiled(texture: Image, rng: Rng, size_px: int) -> NDArray[np.float32]:
     """Repeat a texture in mirrored tiles until it fills a view, turned and scaled at random."""
     side = texture.shape[0]
     scale, angle = rng.uniform(0.6, 1.6), rng.uniform(0.0, 360.0)
@@ -101,9 +90,7 @@ def _tiled(
     return np.asarray(turned, dtype=np.float32)
 
 
-def match_look(
-    image: NDArray[np.uint8], rng: np.random.Generator, materials: Materials
-) -> NDArray[np.uint8]:
+def match_look(image: Image, rng: Rng, materials: Materials) -> Image:
     """Move the light of a view towards that of a real image, and its colours a little."""
     if not materials.looks:
         return image
@@ -124,10 +111,8 @@ _TINTS: dict[Label, tuple[float, float, float]] = {
 """Spread in CIELAB by which the material of a label may differ from what was drawn."""
 
 
-def tint(
-    image: NDArray[np.uint8], classes: NDArray[np.uint8], rng: np.random.Generator
-) -> NDArray[np.uint8]:
-    """Give the labels of a drawn view other tones: the palette is small, the world is not."""
+def tint(image: Image, classes: Image, rng: Rng) -> Image:
+    """Vary the tones of the labels of a drawn view: its palette is small."""
     chosen = [label for label in _TINTS if rng.random() < 0.4]
     if not chosen:
         return image

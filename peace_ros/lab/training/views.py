@@ -4,47 +4,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
 from peace_ros.core.domain import Label
 from peace_ros.lab.training import pasting
+from peace_ros.lab.training.arrays import Image, Rng
 from peace_ros.lab.training.conditions import Condition, apply, pick_condition
-from peace_ros.lab.training.sources import FRAME_PX
+from peace_ros.lab.training.sources import FRAME_PX, TrainingSource
 from peace_ros.lab.training.textures import NO_MATERIALS, Materials, cover, match_look, tint
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from peace_ros.lab.training.sources import TrainingSource
 
 
 @dataclass(frozen=True)
 class TrainingView:
     """What the networks see, with its truth."""
 
-    image_rgb: NDArray[np.uint8]
-    classes: NDArray[np.uint8]
+    image_rgb: Image
+    classes: Image
     """Labels and partial classes."""
     condition: Condition
 
 
-def cut(
-    source: TrainingSource, rng: np.random.Generator, size_px: int, side_px: float | None = None
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8], float]:
+def cut(source: TrainingSource, rng: Rng, size_px: int) -> tuple[Image, Image, float]:
     """Cut a random square and return image, classes and metres per pixel of the cut.
 
-    ``side_px`` fixes the side of a whole frame in source pixels, else it is drawn. A view smaller
-    than a frame keeps the frame's scale. What lies outside of the source is mirrored.
+    A view smaller than a frame keeps the frame's scale; beyond the source, pixels are mirrored.
     """
     low, high = source.frame_side_px
     # Favour near-whole frames: the square root pulls the draw towards the larger side.
-    frame = side_px or float(np.exp(np.log(low) + np.log(high / low) * rng.random() ** 0.6))
+    frame = float(np.exp(np.log(low) + np.log(high / low) * rng.random() ** 0.6))
     side = frame * size_px / FRAME_PX
     level = 0
     while level + 1 < len(source.images_rgb) and side / 2 ** (level + 1) > 0.8 * size_px:
@@ -75,14 +66,7 @@ def cut(
     )
 
 
-def _paste_surfaces(
-    image: NDArray[np.uint8],
-    classes: NDArray[np.uint8],
-    rng: np.random.Generator,
-    gsd_m: float,
-    *,
-    real: bool,
-) -> None:
+def _paste_surfaces(image: Image, classes: Image, rng: Rng, gsd_m: float, *, real: bool) -> None:
     if rng.random() < 0.7:
         pasting.recolour_water(image, classes, rng)
     if rng.random() < (0.4 if real else 0.25):
@@ -93,11 +77,11 @@ def _paste_surfaces(
 
 def _paste(
     source: TrainingSource,
-    image: NDArray[np.uint8],
-    classes: NDArray[np.uint8],
-    rng: np.random.Generator,
+    image: Image,
+    classes: Image,
+    rng: Rng,
     gsd_m: float,
-    foliage: Sequence[NDArray[np.uint8]],
+    foliage: Sequence[Image],
 ) -> None:
     real = source.kind != 'drawn'
     azimuth, reach = rng.uniform(0, 2 * np.pi), rng.uniform(0.2, 1.6)
@@ -129,7 +113,7 @@ def _paste(
             pasting.darken(image, hull, rng.uniform(0.35, 0.75))
 
 
-def jitter(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+def jitter(image: Image, rng: Rng) -> Image:
     """Change exposure, contrast, gamma, white balance, saturation; blur, noise, JPEG at times."""
     steps = np.arange(256, dtype=np.float64) / 255.0
     gamma = np.exp(rng.normal(0, 0.22))
@@ -158,7 +142,7 @@ def jitter(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uin
 
 def sample_view(
     source: TrainingSource,
-    rng: np.random.Generator,
+    rng: Rng,
     size_px: int,
     *,
     condition_chance: float = 0.3,

@@ -242,8 +242,8 @@ def test_each_precision_is_held_against_the_reference(
         narrow_network(), 'narrow', SIDE_PX, licence='none', provenance='random weights'
     )
     if precision == 'int8':  # random weights lose more in int8 than is allowed
-        monkeypatch.setattr(fastsam, 'LEAST_COSINE', 0.9)
-        monkeypatch.setattr(fastsam, 'LEAST_IOU', 0.5)
+        limits = {'cosine': 0.9, 'iou': 0.5}
+        monkeypatch.setattr(fastsam.SegmenterAgreement, 'LEAST', limits)
     agreement = fastsam.export_fastsam(source, clip, tmp_path / 'x', precision=precision)
     bundle = Bundle.load(tmp_path / 'x')
     assert bundle.manifest.precision == precision
@@ -275,7 +275,7 @@ def test_a_poor_precision_is_refused() -> None:
 
     poor = SegmenterAgreement(0.001, 0.0001, 0.9985, 0.99)
     poor.refuse_if_poor('fp32', 'FastSAM-s')
-    with pytest.raises(BundleError, match=r'cosine 0\.99850.*Nothing was written'):
+    with pytest.raises(BundleError, match=r'cosine 0\.9985, .*Nothing was written'):
         poor.refuse_if_poor('int8', 'FastSAM-s')
 
 
@@ -323,7 +323,7 @@ def test_the_command_exports_and_says_how_well_it_agrees(
     options = ['--clip', str(clip_folder), '--out', str(tmp_path / 'models')]
     result = CliRunner().invoke(app, [str(graph_file), *options])
     assert result.exit_code == 0, result.output
-    assert 'agrees with its reference: boxes differ by 0 px' in result.output
+    assert 'agrees with its reference: box error px 0,' in result.output
     assert Bundle.load(tmp_path / 'models' / 'FastSAM-s-fp32').manifest.family == 'fastsam'
     refused = CliRunner().invoke(app, [str(graph_file)])
     assert isinstance(refused.exception, ConfigurationError)

@@ -112,10 +112,10 @@ _FOUND: list[Any] = []
 
 
 def _measured_and_accepted(*given: Any) -> Any:
-    from peace_ros.lab.export.verify import Agreement, compare
+    from peace_ros.lab.export.verify import ModelAgreement, compare
 
     _FOUND.append(compare(*given))
-    return Agreement(0.0, 1.0, 1.0)
+    return ModelAgreement(0.0, 1.0, 1.0)
 
 
 def test_every_product_meant_for_int8_is_in_int8(

@@ -10,12 +10,12 @@ import pytest
 torch = pytest.importorskip('torch')
 pytest.importorskip('onnx')
 
-from peace_ros.core.domain import ConfigurationError  # noqa: E402
+from peace_ros.core.domain import ConfigurationError, Frame  # noqa: E402
 from peace_ros.core.inference import Bundle  # noqa: E402
 from peace_ros.core.resources import models_dir  # noqa: E402
 from peace_ros.lab.training import export  # noqa: E402
 from peace_ros.lab.training.average import average  # noqa: E402
-from peace_ros.lab.training.measure import SafetyModel  # noqa: E402
+from peace_ros.lab.training.measure import PROMPT, open_segmenter  # noqa: E402
 from peace_ros.lab.training.segmenter import create_segmenter  # noqa: E402
 
 
@@ -26,10 +26,15 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
         folder = tmp_path_factory.mktemp(f'seed{seed}') / 'clipseg-small'
         model = create_segmenter(seed).eval()
         export.export_segmenter(
-            model, folder, provenance=f'Seed {seed}.', recommended={'threshold': 0.4}
+            model, folder, provenance=f'Seed {seed}.', recommended={'threshold': 0.5}
         )
         folders.append(folder)
     return folders[0], folders[1]
+
+
+def _safety(bundle: Path, image: np.ndarray) -> np.ndarray:
+    segmenter = open_segmenter(bundle, 'peace_cs', threads=1)
+    return segmenter.segment(Frame(image, 0), PROMPT).safety
 
 
 def test_the_ends_are_the_bundles_and_the_middle_is_neither(
@@ -39,9 +44,9 @@ def test_the_ends_are_the_bundles_and_the_middle_is_neither(
     heatmaps = {}
     for share in (0.0, 0.5, 1.0):
         average(*two, tmp_path / f'{share}', share)
-        heatmaps[share] = SafetyModel(tmp_path / f'{share}', threads=1).safety(image)
+        heatmaps[share] = _safety(tmp_path / f'{share}', image)
     for share, folder in zip((0.0, 1.0), two, strict=True):
-        given = SafetyModel(folder, threads=1).safety(image)
+        given = _safety(folder, image)
         assert np.abs(heatmaps[share] - given).max() < 1e-5
         assert np.abs(heatmaps[share] - heatmaps[0.5]).max() > 1e-3
 

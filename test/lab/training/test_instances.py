@@ -25,13 +25,14 @@ from peace_ros.core.segmentation import (  # noqa: E402
 from peace_ros.lab.training.annotations import VEGETATION  # noqa: E402
 from peace_ros.lab.training.batches import pixel_class_table  # noqa: E402
 from peace_ros.lab.training.instances import batches, export, losses, networks, targets  # noqa: E402
-from peace_ros.lab.training.instances.measure import NAME, InstanceReport, InstanceRow, best_row  # noqa: E402
 from peace_ros.lab.training.instances.recipe import (  # noqa: E402
+    NAME,
     InstanceRecipe,
     create_matcher,
     create_network,
-    run,
+    merit,
 )
+from peace_ros.lab.training.measure import ThresholdRow  # noqa: E402
 
 pytestmark = pytest.mark.training
 
@@ -248,8 +249,8 @@ def test_onnx_says_what_torch_says(tmp_path: Path) -> None:
     torch.set_num_threads(1)
     network, matcher = create_network(1).eval(), create_matcher(1).eval()
     network = network.to(memory_format=torch.contiguous_format)
-    export.export_bundle(
-        network, matcher, tmp_path / NAME, export.Description('test', {}, shift=0.5), halve=False
+    export.export_instances(
+        network, matcher, tmp_path / NAME, provenance='test', shift=0.5, halve=False
     )
     generator = torch.Generator().manual_seed(0)
     pixels = torch.randn(1, 3, networks.INPUT_PX, networks.INPUT_PX, generator=generator)
@@ -275,11 +276,11 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, InstanceRec
     folder = tmp_path_factory.mktemp('instances')
     torch.set_num_threads(1)
     recipe = InstanceRecipe(
-        out=folder / 'models', work=folder / 'work', steps=3, scenes=3, choice_scenes=1,
-        batch_size=2, views_of_crops=3, scene_px=256, side_px=96, shifts=(0.0,),
+        out=folder / 'models', work=folder / 'work', steps=3, scenes=3, validation_scenes=1,
+        batch_size=2, crop_batch_size=3, scene_px=256, view_px=96, shifts=(0.0,),
     )  # fmt: skip
     stages: set[str] = set()
-    run(recipe, lambda stage, *_: stages.add(stage))
+    recipe.run(lambda stage, *_: stages.add(stage))
     return folder, recipe, stages
 
 
@@ -309,7 +310,7 @@ def test_a_finished_run_continues_without_another_step(
     }
     curve = (folder / 'work/instances.csv').read_text()
     assert curve.startswith('step,elapsed_s,confidence,box,mask,class')
-    run(replace(recipe, out=folder / 'again'), lambda *_: None)
+    replace(recipe, out=folder / 'again').run(lambda *_: None)
     for name, stored in before.items():
         after = torch.load(folder / f'work/{name}.pt', weights_only=True)
         assert stored['step'] == after['step'] == 3
@@ -324,7 +325,9 @@ def test_batches_follow_from_seed_and_number_alone(
 
     folder, recipe, _ = trained
     sources = load_drawn(folder / 'work/scenes', range(3), size_px=recipe.scene_px, workers=1)
-    first, second = (batches.CropMaker(sources, 5, views=2, prompts=3, side_px=96) for _ in 'ab')
+    first, second = (
+        batches.CropMaker(sources, 5, batch_size=2, prompts=3, view_px=96) for _ in 'ab'
+    )
     one, other = first.make(7), second.make(7)
     assert torch.equal(one.pixels, other.pixels)
     assert torch.equal(one.wanted, other.wanted)
@@ -372,12 +375,12 @@ def test_the_pair_starts_from_what_a_segmenter_has_seen_and_goes_on_learning(
 
 
 def test_the_threshold_keeps_hazards_out_before_it_raises_miou() -> None:
-    def row(threshold: float, miou: float, persons: float, false_safe: float) -> InstanceRow:
-        return InstanceRow(threshold, miou, 0.5, false_safe, {'PERSON': persons})
+    def row(threshold: float, miou: float, persons: float, false_safe: float) -> ThresholdRow:
+        return ThresholdRow(threshold, miou, 0.5, false_safe, 0.1, persons)
 
     people = (row(0.4, 0.8, 0.19, 0.01), row(0.5, 0.7, 0.09, 0.01), row(0.6, 0.6, 0.0, 0.01))
-    assert best_row(InstanceReport(people, 1.0, 9.0, 0.38)).threshold == 0.5
-    assert best_row(InstanceReport(people[:1], 1.0, 9.0, 0.38)).threshold == 0.4
+    assert max(people, key=merit).threshold == 0.5
+    assert max(people[:1], key=merit).threshold == 0.4
     ground = (row(0.4, 0.8, 0.0, 0.09), row(0.5, 0.7, 0.0, 0.07), row(0.6, 0.6, 0.0, 0.04))
-    assert best_row(InstanceReport(ground, 1.0, 9.0, 0.38)).threshold == 0.6
-    assert best_row(InstanceReport(ground[:2], 1.0, 9.0, 0.38)).threshold == 0.5
+    assert max(ground, key=merit).threshold == 0.6
+    assert max(ground[:2], key=merit).threshold == 0.5

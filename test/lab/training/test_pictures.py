@@ -94,7 +94,7 @@ def test_pasted_people_are_labelled_and_seen(paste: object) -> None:
 def test_people_are_widened_in_what_training_asks_for() -> None:
     source = _source('drone', (100, 120, 90), Label.GRASS)
     source.classes[0][150, 150] = Label.PERSON
-    maker = BatchMaker([(1.0, [source])], seed=0, batch_size=8, view_px=192, prompts=0)
+    maker = BatchMaker([source], {'drone': 1.0}, 0, batch_size=8, view_px=192, prompts=0)
     for batch in (maker.make(number) for number in range(4)):
         for view, wanted in zip(batch.views, batch.classes.numpy(), strict=True):
             people = view.classes == Label.PERSON

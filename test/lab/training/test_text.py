@@ -10,7 +10,7 @@ from peace_ros.core.domain import Label
 pytest.importorskip('tokenizers')
 text = pytest.importorskip('peace_ros.lab.training.text')
 
-ALL_CONDITION_WORDS = text.RESOLUTION_WORDS + text.FRAME_WORDS + text.ENVIRONMENT_WORDS
+ALL_CONDITION_WORDS = [word for words in text.CONDITION_WORDS.values() for word in words]
 
 
 def test_every_vocabulary_word_template_and_term_group_is_known() -> None:

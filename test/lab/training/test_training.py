@@ -20,7 +20,6 @@ from peace_ros.lab.training import annotations, batches, export, losses, recipe,
 from peace_ros.lab.training.loop import TimeBudget, learning_rate  # noqa: E402
 from peace_ros.lab.training.ranker import create_ranker  # noqa: E402
 from peace_ros.lab.training.segmenter import create_segmenter  # noqa: E402
-from peace_ros.lab.training.text import build_tokenizer  # noqa: E402
 
 TEXTS = ['grass', 'A rendered image of road in night.', 'zzz, water']
 
@@ -30,20 +29,16 @@ def tiny(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[str
     folder = tmp_path_factory.mktemp('training')
     stages: list[tuple[str, float]] = []
     torch.set_num_threads(1)
-    recipe.run(
-        recipe.Recipe(
-            out=folder / 'models', work=folder / 'work', steps=3, scenes=3, validation_scenes=1,
-            batch_size=2, view_px=64, scene_px=256, text_steps=3,
-        ),
-        lambda stage, share, line: stages.append((stage, share)),
+    tiny = recipe.Recipe(
+        out=folder / 'models', work=folder / 'work', steps=3, scenes=3, validation_scenes=1,
+        batch_size=2, view_px=64, scene_px=256, text_steps=3,
     )  # fmt: skip
+    tiny.run(lambda stage, share, line: stages.append((stage, share)))
     return folder, stages
 
 
 def _tokens() -> tuple[Any, Any]:
-    encoded = build_tokenizer().encode_batch(TEXTS)
-    ids = torch.tensor([each.ids for each in encoded])
-    return ids, torch.tensor([each.attention_mask for each in encoded])
+    return batches.encode(TEXTS)
 
 
 def test_the_recipe_writes_two_bundles_that_the_runtime_accepts(
@@ -75,10 +70,8 @@ def test_curves_are_kept_and_a_finished_run_continues_without_another_step(
 def test_onnx_says_what_torch_says(tmp_path: Path) -> None:
     torch.set_num_threads(1)
     model = create_segmenter(1).eval()
-    export.export_segmenter(
-        model, tmp_path / 'clipseg-small', provenance='test', recommended={}, halve=False
-    )
-    model = export.with_weights(model, model.state_dict())
+    model.to(memory_format=torch.contiguous_format)
+    export.export_segmenter(model, tmp_path / 'clipseg-small', provenance='test', halve=False)
     bundle = Bundle.load(tmp_path / 'clipseg-small')
     sessions = open_sessions(bundle, ('image_encoder', 'text_encoder', 'decoder'), threads=1)
     pixels = torch.randn(1, 3, 352, 352, generator=torch.Generator().manual_seed(0))
@@ -110,7 +103,7 @@ def test_the_ranker_in_onnx_says_what_torch_says_also_with_halved_weights(tmp_pa
         wanted = model.image(pixels).numpy()
     for halve, tolerance in ((False, 1e-4), (True, 1e-2)):
         folder = tmp_path / f'clip-{halve}'
-        export.export_ranker(model, folder, provenance='test', recommended={}, halve=halve)
+        export.export_ranker(model, folder, provenance='test', halve=halve)
         session = Session(folder / 'image_encoder.onnx', threads=1)
         (got,) = session.run(['image_embedding'], {'pixel_values': pixels.numpy()})
         np.testing.assert_allclose(got, wanted, atol=tolerance)

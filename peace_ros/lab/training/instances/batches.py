@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
+from torch import Tensor
 
 from peace_ros.core.domain import Label
 from peace_ros.core.inference.manifest import InputSpec
@@ -17,27 +17,20 @@ from peace_ros.core.segmentation.fastsam import Placement, Segment
 from peace_ros.core.segmentation.fastsam.crops import Cutter
 from peace_ros.core.segmentation.fastsam.letterbox import BORDER_LEVEL
 from peace_ros.lab.training.annotations import PIXEL_CLASS_COUNT
+from peace_ros.lab.training.arrays import Image, Rng
 from peace_ros.lab.training.backbone import MEAN, STD
-from peace_ros.lab.training.batches import BatchT, made_ahead, pixel_class_table, to_pixels
-from peace_ros.lab.training.instances.networks import CROP_PX, INPUT_PX
-from peace_ros.lab.training.instances.targets import (
-    Instances,
-    assign,
-    cell_masks,
-    find_instances,
-    roughened,
+from peace_ros.lab.training.batches import (
+    BatchT,
+    Maker,
+    encode,
+    pixel_class_table,
+    to_pixels,
+    wanted_labels,
 )
-from peace_ros.lab.training.text import build_tokenizer, sample_prompt
-from peace_ros.lab.training.textures import gather_materials
-from peace_ros.lab.training.views import sample_view
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
-    from torch import Tensor
-
-    from peace_ros.lab.training.sources import TrainingSource
+from peace_ros.lab.training.instances import targets
+from peace_ros.lab.training.instances.networks import CROP_PX
+from peace_ros.lab.training.sources import TrainingSource
+from peace_ros.lab.training.text import sample_prompt
 
 CROP_INPUT = InputSpec(CROP_PX, CROP_PX, 'letterbox', MEAN, STD)
 _SHARES = {'drawn': 0.6, 'satellite': 0.1, 'drone': 0.3}
@@ -84,132 +77,92 @@ class CropBatch:
     """Float32 [T, 9]: labels that each prompt stands for."""
 
 
-class Maker(ABC, Generic[BatchT]):
-    """Makes batch n from the seed and n alone, so that a resumed run sees what it would have."""
+class _BorderedMaker(Maker[BatchT]):
+    """Views, at times with the borders of a wide frame."""
 
-    def __init__(
-        self, sources: list[TrainingSource], seed: int, *, batch_size: int, side_px: int
-    ) -> None:
-        self._groups = [
-            (share, [source for source in sources if source.kind == kind])
-            for kind, share in _SHARES.items()
-        ]
-        self._groups = [(share, group) for share, group in self._groups if group]
-        total = sum(share for share, _ in self._groups)
-        self._chances = [share / total for share, _ in self._groups]
-        self._seed, self._batch_size, self._side_px = seed, batch_size, side_px
-        self._materials = gather_materials(sources, np.random.default_rng([seed, 4]))
-
-    @abstractmethod
-    def make(self, number: int) -> BatchT:
-        """Return batch ``number``."""
-
-    def stream(self, first: int) -> Iterator[BatchT]:
-        """Yield batches first, first + 1, ... made ahead of their use."""
-        return made_ahead(self.make, first, threads=1, ahead=3)
-
-    def _view(self, rng: np.random.Generator) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """Return image and classes of a view, at times with the borders of a wide frame."""
-        group = self._groups[int(rng.choice(len(self._groups), p=self._chances))][1]
-        source = group[int(rng.integers(len(group)))]
-        view = sample_view(
-            source, rng, self._side_px, condition_chance=0.15, materials=self._materials
-        )
+    def _bordered(self, rng: Rng) -> tuple[Image, Image]:
+        """Return image and classes of a view."""
+        view = self._view(rng)
         image, classes = view.image_rgb, view.classes
         if rng.random() < 0.25:
-            border = int(rng.uniform(0.06, 0.22) * self._side_px)
+            border = int(rng.uniform(0.06, 0.22) * self._view_px)
             image, classes = image.copy(), classes.copy()
             for rows in (slice(0, border), slice(-border, None)):
                 image[rows], classes[rows] = BORDER_LEVEL, Label.UNLABELED
         return image, classes
 
 
-class InstanceMaker(Maker[InstanceBatch]):
+class InstanceMaker(_BorderedMaker[InstanceBatch]):
     """Batches for the segmenter."""
 
-    def __init__(
-        self, sources: list[TrainingSource], seed: int, *, batch_size: int, side_px: int = INPUT_PX
-    ) -> None:
-        super().__init__(sources, seed, batch_size=batch_size, side_px=side_px)
+    def __init__(self, sources: list[TrainingSource], seed: int, **size: int) -> None:
+        """``size``: batch_size and view_px."""
+        super().__init__(sources, _SHARES, seed, condition_chance=0.15, salt=(21,), **size)
 
-    def make(self, number: int) -> InstanceBatch:
-        """Return batch ``number``."""
-        rng = np.random.default_rng([self._seed, 21, number])
-        views = [self._view(rng) for _ in range(self._batch_size)]
-        found = [find_instances(classes) for _, classes in views]
-        duties = [assign(each) for each in found]
+    def _draw(self, rng: Rng) -> InstanceBatch:
+        views = [self._bordered(rng) for _ in range(self._batch_size)]
+        found = [targets.find_instances(classes) for _, classes in views]
+        duties = [targets.assign(each) for each in found]
         return InstanceBatch(
-            to_pixels(np.stack([image for image, _ in views])),
+            to_pixels([image for image, _ in views]),
             torch.from_numpy(np.stack([classes for _, classes in views]).astype(np.int64)),
             torch.from_numpy(np.stack([each.owners for each in duties])),
             torch.from_numpy(np.stack([each.priors for each in duties])),
             tuple(torch.from_numpy(each.boxes) for each in found),
-            tuple(torch.from_numpy(cell_masks(each)) for each in found),
+            tuple(torch.from_numpy(targets.cell_masks(each)) for each in found),
             tuple(torch.from_numpy(each.classes.astype(np.int64)) for each in found),
         )
 
 
-class CropMaker(Maker[CropBatch]):
+class CropMaker(_BorderedMaker[CropBatch]):
     """Batches for the pair that names segments."""
 
     def __init__(
-        self, sources: list[TrainingSource], seed: int, *, views: int, prompts: int,
-        side_px: int = INPUT_PX,
-    ) -> None:  # fmt: skip
-        super().__init__(sources, seed, batch_size=views, side_px=side_px)
+        self, sources: list[TrainingSource], seed: int, *, prompts: int, **size: int
+    ) -> None:
+        """``size``: batch_size (in views) and view_px."""
+        super().__init__(sources, _SHARES, seed, condition_chance=0.15, salt=(22,), **size)
         self._prompts = prompts
-        self._tokenizer = build_tokenizer()
         self._table = pixel_class_table().numpy()
 
-    def make(self, number: int) -> CropBatch:
-        """Return batch ``number``."""
-        rng = np.random.default_rng([self._seed, 22, number])
+    def _draw(self, rng: Rng) -> CropBatch:
         cutter = Cutter(CROP_INPUT, _CROPS_PER_VIEW)
-        place = Placement(0, 0, self._side_px, self._side_px)
+        place = Placement(0, 0, self._view_px, self._view_px)
         pixels: list[NDArray[np.float32]] = []
         labels: list[NDArray[np.float32]] = []
-        while not pixels:
-            for _ in range(self._batch_size):
-                image, classes = self._view(rng)
-                segments, truths = self._segments(classes, rng)
-                pixels.append(cutter(image, segments, place).copy())
-                labels += truths
-        may_be = np.array(labels, np.float32).reshape(-1, self._table.shape[1])
+        for _ in range(self._batch_size):
+            image, classes = self._bordered(rng)
+            segments, truths = self._segments(classes, rng)
+            pixels.append(cutter(image, segments, place).copy())
+            labels += truths
+        may_be = torch.from_numpy(np.array(labels, np.float32).reshape(-1, self._table.shape[1]))
         prompts = [sample_prompt(rng) for _ in range(self._prompts)]
-        encoded = self._tokenizer.encode_batch([prompt.text for prompt in prompts])
-        wanted = np.zeros((self._prompts, self._table.shape[1]), np.float32)
-        for row, prompt in enumerate(prompts):
-            for label in prompt.labels:
-                wanted[row, label - 1] = 1.0
         return CropBatch(
             torch.from_numpy(np.concatenate(pixels)),
-            torch.from_numpy(may_be),
-            torch.from_numpy((may_be.sum(axis=1) == 1.0).astype(np.float32)),
-            torch.tensor([each.ids for each in encoded]),
-            torch.tensor([each.attention_mask for each in encoded]),
-            torch.from_numpy(wanted),
+            may_be,
+            (may_be.sum(dim=1) == 1.0).to(torch.float32),
+            *encode([prompt.text for prompt in prompts]),
+            wanted_labels(prompts),
         )
 
     def _segments(
-        self, classes: NDArray[np.uint8], rng: np.random.Generator
+        self, classes: Image, rng: Rng
     ) -> tuple[list[Segment], list[NDArray[np.float32]]]:
         """Draw segments of a view with the labels that each may be."""
-        found = find_instances(classes, least_px=_LEAST_CROP_PX)
-        chosen = _pick(found, rng)
+        found = targets.find_instances(classes, least_px=_LEAST_CROP_PX)
         segments, truths = [], []
-        for index in chosen:
+        for index in _pick(found, rng):
             if rng.random() < _MIXED_CHANCE:
                 segment, truth = _mixed(found, index, classes, rng, self._table)
             else:
-                segment = _cut(found, index, rng)
-                truth = self._table[found.classes[index]]
+                segment, truth = _cut(found, index, rng), self._table[found.classes[index]]
             if truth.any():
                 segments.append(segment)
                 truths.append(truth)
         return segments, truths
 
 
-def _pick(found: Instances, rng: np.random.Generator) -> list[int]:
+def _pick(found: targets.Instances, rng: Rng) -> list[int]:
     """Choose instances of every class alike, large ones more often."""
     if not len(found):
         return []
@@ -219,15 +172,15 @@ def _pick(found: Instances, rng: np.random.Generator) -> list[int]:
     return list(rng.choice(len(found), count, replace=False, p=weight / weight.sum()))
 
 
-def _cut(found: Instances, index: int, rng: np.random.Generator) -> Segment:
+def _cut(found: targets.Instances, index: int, rng: Rng) -> Segment:
     """Return an instance as the segmenter would find it."""
     left, top, right, bottom = found.boxes[index].astype(int).tolist()
-    mask = roughened(found.ids[top:bottom, left:right] == index + 1, rng)
+    mask = targets.roughened(found.ids[top:bottom, left:right] == index + 1, rng)
     return Segment(left, top, mask, int(mask.sum()), 1.0, 1.0)
 
 
 def _mixed(
-    found: Instances, index: int, classes: NDArray[np.uint8], rng: np.random.Generator,
+    found: targets.Instances, index: int, classes: Image, rng: Rng,
     table: NDArray[np.float32],
 ) -> tuple[Segment, NDArray[np.float32]]:  # fmt: skip
     """Return a rectangle around an instance, of whatever lies in it, as a bad mask would be."""

@@ -1,34 +1,22 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the segmenter and the pair that names segments are punished for."""
+"""Losses of the segmenter and of the pair that names segments."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
-
 import numpy as np
 import torch
+from torch import Tensor
 from torch.nn import functional
 
-from peace_ros.lab.training.batches import pixel_class_table
-from peace_ros.lab.training.instances.networks import (
-    CELL_PX,
-    InstanceNetwork,
-    Matcher,
-    Raw,
-    anchor_points,
-    decode_boxes,
-    widen,
-)
+from peace_ros.core.segmentation import load_terms
+from peace_ros.lab.training.batches import encode, pixel_class_table, wanted_labels
+from peace_ros.lab.training.instances import networks
+from peace_ros.lab.training.instances.batches import CropBatch, InstanceBatch
 from peace_ros.lab.training.instances.targets import IGNORED, NOTHING
 from peace_ros.lab.training.losses import class_loss, class_weights, shares
-from peace_ros.lab.training.measure import NEGATIVE_TERMS, POSITIVE_TERMS
-from peace_ros.lab.training.text import TEMPLATES, TERMS, build_tokenizer
-
-if TYPE_CHECKING:
-    from torch import Tensor, nn
-
-    from peace_ros.lab.training.instances.batches import CropBatch, InstanceBatch
+from peace_ros.lab.training.networks import Pair
+from peace_ros.lab.training.text import TEMPLATES, TERMS, TermPrompt
 
 ANCHORS_PER_INSTANCE = 9
 MASKS_PER_VIEW = 28
@@ -37,7 +25,7 @@ _LEAST_QUALITY = 0.5
 _MARGIN = (0.45, 16.0)
 """Around a box, where its mask must still be right: share of its size, and pixels."""
 _SAME_CLASS = 0.1
-"""Weight of cells of another part of the same class: in one mask they do no harm."""
+"""Weight of cells of another part of the same class: in one mask they are harmless."""
 _HAZARD_WEIGHT = 1.6
 
 
@@ -64,21 +52,23 @@ def _corners(boxes: Tensor) -> Tensor:
 class InstanceLoss:
     """Confidence, boxes, masks and classes of a batch.
 
-    Of the anchors inside of an instance those answer for it that lie deepest, are surest and whose
-    boxes fit best (after TOOD, Feng et al., ICCV 2021); the confidence learns how good they are.
+    Of the anchors inside an instance those predict it that lie deepest, are most confident and have
+    the best boxes (after TOOD, Feng et al., ICCV 2021); the confidence learns how good they are.
     """
 
     def __init__(self) -> None:
         self._table = pixel_class_table()
         self._weights = class_weights()
 
-    def __call__(self, model: nn.Module, batch: InstanceBatch) -> dict[str, Tensor]:
+    def __call__(
+        self, network: networks.InstanceNetwork, batch: InstanceBatch
+    ) -> dict[str, Tensor]:
         """Run the network in bfloat16 where the processor has it, the losses in float32."""
         with torch.autocast('cpu', dtype=torch.bfloat16):
-            raw = cast('InstanceNetwork', model)(batch.pixels)
+            raw = network(batch.pixels)
         raw = raw.to_float()
-        anchors = anchor_points(batch.pixels.shape[-1])
-        boxes = decode_boxes(raw.boxes, anchors)
+        anchors = networks.anchor_points(batch.pixels.shape[-1])
+        boxes = networks.decode_boxes(raw.boxes, anchors)
         wanted = _wanted_boxes(batch)
         iou, generous = overlaps(_corners(boxes), wanted)
         quality = _assign(batch, raw.logits, iou)
@@ -100,10 +90,11 @@ class InstanceLoss:
             * class_loss(raw.classes, shares(batch.classes), self._table, self._weights),
         }
 
-    def _mask_loss(self, batch: InstanceBatch, raw: Raw, quality: Tensor) -> Tensor:
+    def _mask_loss(self, batch: InstanceBatch, raw: networks.Raw, quality: Tensor) -> Tensor:
         """Return cross-entropy and overlap loss (dice) of masks inside of their true boxes."""
         losses = []
-        cells = batch.classes[:, CELL_PX // 2 :: CELL_PX, CELL_PX // 2 :: CELL_PX]
+        middles = slice(networks.CELL_PX // 2, None, networks.CELL_PX)
+        cells = batch.classes[:, middles, middles]
         for view, prototypes in enumerate(raw.prototypes):
             chosen = quality[view].nonzero()[:, 0]
             if not len(chosen):
@@ -127,7 +118,7 @@ class InstanceLoss:
 
 
 def _wanted_boxes(batch: InstanceBatch) -> Tensor:
-    """Return the box of each anchor's instance: [B, A, 4]; of nobody's anchors, a unit box."""
+    """Return the box of each anchor's instance: [B, A, 4]; of anchors without one, a unit box."""
     rows = []
     for owners, boxes in zip(batch.owners, batch.boxes, strict=True):
         known = torch.cat([torch.tensor([[0.0, 0.0, 1.0, 1.0]]), boxes])
@@ -153,8 +144,8 @@ def _assign(batch: InstanceBatch, logits: Tensor, iou: Tensor) -> Tensor:
 def _inside(boxes: Tensor, cells: int) -> Tensor:
     """Tell the cells within boxes (corners) and the margin around them: float32 [N, h, w]."""
     sizes = boxes[:, 2:] - boxes[:, :2]
-    grown = widen(torch.cat([(boxes[:, :2] + boxes[:, 2:]) / 2.0, sizes], dim=1), *_MARGIN)
-    left, top, right, bottom = (_corners(grown) / CELL_PX).unbind(dim=1)
+    grown = networks.widen(torch.cat([(boxes[:, :2] + boxes[:, 2:]) / 2.0, sizes], dim=1), *_MARGIN)
+    left, top, right, bottom = (_corners(grown) / networks.CELL_PX).unbind(dim=1)
     at = torch.arange(cells) + 0.5
     x = (at > left[:, None]) & (at < right[:, None])
     y = (at > top[:, None]) & (at < bottom[:, None])
@@ -166,30 +157,19 @@ class MatchLoss:
 
     def __init__(self, seed: int) -> None:
         self._rng = np.random.default_rng([seed, 23])
-        self._tokenizer = build_tokenizer()
-        terms = POSITIVE_TERMS + NEGATIVE_TERMS
         meanings = {term.strip(): labels for labels, group in TERMS for term in group.split(';')}
-        self._terms = terms
-        self._wanted = torch.zeros(len(terms), pixel_class_table().shape[1])
-        for row, term in enumerate(terms):
-            for label in meanings[term]:
-                self._wanted[row, label - 1] = 1.0
+        self._terms = load_terms().all
+        self._wanted = wanted_labels([TermPrompt(term, meanings[term]) for term in self._terms])
 
-    def __call__(self, model: nn.Module, batch: CropBatch) -> dict[str, Tensor]:
+    def __call__(self, matcher: Pair, batch: CropBatch) -> dict[str, Tensor]:
         """Score all segments of the batch against both sets of prompts."""
-        matcher = cast('Matcher', model)
         with torch.autocast('cpu', dtype=torch.bfloat16):
             maps = matcher.image.backbone(batch.pixels)
         image = matcher.image.describe(batch.pixels, [level.float() for level in maps.values()])
         template = TEMPLATES[int(self._rng.integers(len(TEMPLATES)))]
         slots = {'resolution': 'rendered', 'frame': 'view', 'environment': 'summer'}
-        encoded = self._tokenizer.encode_batch(
-            [template.format(term=term, **slots) for term in self._terms]
-        )
-        terms = matcher.text(
-            torch.tensor([each.ids for each in encoded]),
-            torch.tensor([each.attention_mask for each in encoded]),
-        )
+        texts = [template.format(term=term, **slots) for term in self._terms]
+        terms = matcher.text(*encode(texts))
         prompts = matcher.text(batch.input_ids, batch.attention_mask)
         scale = matcher.scale()
         return {

@@ -8,25 +8,16 @@ in FastSAM.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from peace_ros.lab.training.backbone import CHANNELS, Backbone
-from peace_ros.lab.training.networks import (
-    CLASS_COUNT,
-    EMBEDDING_WIDTH,
-    ConvBn,
-    Residual,
-    SmallTextTower,
-    double,
-)
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
+from peace_ros.lab.training.networks import CLASS_COUNT, EMBEDDING_WIDTH, ConvBn, double, unit
 
 INPUT_PX = 320
 CROP_PX = 64
@@ -41,7 +32,7 @@ _MOST_LOG_SIZE = 4.0
 _CROPS_DEEPEST = 16
 """Stride of the deepest map of a segment: 4 x 4 cells of it."""
 _FROZEN_STAGES = 2
-"""Of the backbone: what ImageNet taught about edges and colours needs no change."""
+"""Of the backbone: what it learned about edges and colours from ImageNet needs no change."""
 
 
 def anchor_points(side_px: int) -> Tensor:
@@ -56,12 +47,12 @@ def anchor_points(side_px: int) -> Tensor:
 
 @dataclass(frozen=True)
 class Raw:
-    """What the network says of a batch, before it is decoded."""
+    """The output of the network for a batch, before it is decoded."""
 
     boxes: Tensor
     """[B, A, 4]: offset of the centre and logarithm of the size, in strides."""
     logits: Tensor
-    """[B, A]: that an instance is told by this anchor."""
+    """[B, A]: that this anchor predicts an instance."""
     coefficients: Tensor
     """[B, A, K]."""
     prototypes: Tensor
@@ -77,8 +68,8 @@ class Raw:
 def widen(boxes: Tensor, share: float, pixels: float) -> Tensor:
     """Return boxes (centre x, y, width, height) of sizes grown by a share and by pixels.
 
-    Where a meadow ends is hard to tell from its middle, while its mask stops by itself: a box cuts
-    off less when it is too large.
+    The border of a meadow is hard to predict from its middle, while its mask ends by itself: a box
+    that is too large cuts off less.
     """
     return torch.cat([boxes[..., :2], boxes[..., 2:] * (1.0 + share) + pixels], dim=-1)
 
@@ -89,6 +80,19 @@ def decode_boxes(raw: Tensor, anchors: Tensor) -> Tensor:
     centres = points + raw[..., :2] * strides
     sizes = raw[..., 2:].clamp(-_MOST_LOG_SIZE, _MOST_LOG_SIZE).exp() * strides
     return torch.cat([centres, sizes], dim=-1)
+
+
+class Residual(nn.Module):
+    """Two 3 x 3 convolutions around a skip."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.first = ConvBn(channels, channels)
+        self.second = ConvBn(channels, channels, relu=False)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Keep the shape."""
+        return functional.relu(x + self.second(self.first(x)))
 
 
 class Trunk(nn.Module):
@@ -108,7 +112,7 @@ class Trunk(nn.Module):
         self.smooth4 = ConvBn(_NECK, _NECK)
 
     def freeze(self, stages: int) -> None:
-        """Keep the stem and this many stages of the backbone as they are."""
+        """Do not train the stem and this many stages of the backbone."""
         self.frozen = (self.backbone.stem, *self.backbone.stages[:stages])
         for part in self.frozen:
             part.requires_grad_(False)
@@ -145,7 +149,7 @@ class InstanceNetwork(nn.Module):
         self.coefficient = nn.Conv2d(_NECK, COEFFICIENTS, 1)
         self.prototype = nn.Conv2d(_NECK, COEFFICIENTS, 1)
         self.classes = nn.Conv2d(_NECK, CLASS_COUNT, 1)
-        # At first an instance is told by one anchor in fifty, and it is two strides wide.
+        # At first one anchor in fifty predicts an instance, two strides wide.
         nn.init.constant_(cast('Tensor', self.logit.bias), -4.0)
         nn.init.constant_(cast('Tensor', self.box.bias)[2:], 0.7)
 
@@ -198,7 +202,7 @@ class CropEncoder(nn.Module):
         # What shows in one place only: a car in a yard.
         parts.append((x - 1e4 * (1.0 - shown)).amax(dim=(2, 3)))
         out = self.head(self.norm(torch.cat(parts, dim=1)))
-        return cast('Tensor', out / (out.square().sum(dim=1, keepdim=True) + 1e-8).sqrt())
+        return unit(out)
 
 
 def _moments(x: Tensor, shown: Tensor) -> tuple[Tensor, Tensor]:
@@ -207,17 +211,3 @@ def _moments(x: Tensor, shown: Tensor) -> tuple[Tensor, Tensor]:
     mean = (x * shown).sum(dim=(2, 3)) / count
     variance = ((x - mean[:, :, None, None]).square() * shown).sum(dim=(2, 3)) / count
     return mean, (variance + 1e-6).sqrt()
-
-
-class Matcher(nn.Module):
-    """The CLIP-like pair over segments."""
-
-    def __init__(self, vocabulary_size: int) -> None:
-        super().__init__()
-        self.image = CropEncoder()
-        self.text = SmallTextTower(vocabulary_size)
-        self.log_scale = nn.Parameter(torch.tensor(2.5))
-
-    def scale(self) -> Tensor:
-        """Return what cosines are multiplied by before a softmax."""
-        return self.log_scale.exp().clamp(max=40.0)

@@ -1,9 +1,9 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a class raster to instances, and which anchor has to tell which of them.
+"""From a class raster to instances, and which anchor predicts which of them.
 
-As FastSAM segments everything, ground is made of instances too: each connected part of a class is
-one, be it a car or a meadow.
+FastSAM segments everything, so ground consists of instances too: each connected part of a class is
+one, a car or a meadow.
 """
 
 from __future__ import annotations
@@ -15,15 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import Label
+from peace_ros.lab.training.arrays import Image, Rng
 from peace_ros.lab.training.instances.networks import CELL_PX, STRIDES
 
 LEAST_PX = 6
-"""A smaller part is a crumb that nobody has to find."""
+"""Smaller parts need not be found."""
 MOST_INSTANCES = 72
 IGNORED, NOTHING = -1, 0
-"""Owners of anchors: not to be judged, and no instance."""
+"""Owners of anchors: not part of the loss, and no instance."""
 _SIDES_PX = ((0, 96), (48, 208), (128, 1 << 20))
-"""Longest side of the boxes that a level tells; the ranges overlap, the better anchor wins."""
+"""Longest side of the boxes that a level predicts; where they overlap, the better anchor counts."""
 _SMALL_PX = 160
 _FEATHER = 3
 _THINGS = (Label.VEHICLE, Label.PERSON, Label.OBSTACLE)
@@ -34,8 +35,8 @@ class Instances:
     """The instances of one view."""
 
     ids: NDArray[np.int32]
-    """H x W: 1 + index of the instance, 0 where it is not known or a crumb."""
-    classes: NDArray[np.uint8]
+    """H x W: 1 + index of the instance, 0 where it is unknown or too small."""
+    classes: Image
     """[G]: label or partial class."""
     boxes: NDArray[np.float32]
     """[G, 4]: left, top, right, bottom in pixels."""
@@ -47,12 +48,12 @@ class Instances:
 
 
 def find_instances(
-    classes: NDArray[np.uint8], *, least_px: int = LEAST_PX, most: int = MOST_INSTANCES
+    classes: Image, *, least_px: int = LEAST_PX, most: int = MOST_INSTANCES
 ) -> Instances:
-    """Part a class raster [H, W] into connected instances; 0 (unlabeled) is none.
+    """Divide a class raster [H, W] into connected instances; 0 (unlabeled) is no instance.
 
-    When there are more than ``most``, the smallest that are no vehicle, person or obstacle go
-    first.
+    When there are more than ``most``, the smallest that are no vehicle, person or obstacle are
+    dropped first.
     """
     parts: list[tuple[int, int, NDArray[np.int32], tuple[int, int, int, int, int]]] = []
     for value in np.unique(classes).tolist():
@@ -95,7 +96,7 @@ def depths(instances: Instances) -> NDArray[np.float32]:
 
 @dataclass(frozen=True)
 class Duties:
-    """What each of the A anchors of a view has to tell."""
+    """What each of the A anchors of a view must predict."""
 
     owners: NDArray[np.int64]
     """[A]: 1 + index of an instance, NOTHING or IGNORED."""
@@ -104,7 +105,7 @@ class Duties:
 
 
 def assign(instances: Instances) -> Duties:
-    """Give each anchor the instance it lies in, where its level tells boxes of that size.
+    """Give each anchor the instance it lies in, where its level predicts boxes of that size.
 
     An instance that no anchor lies in gets the anchor nearest to its deepest pixel.
     """
@@ -118,8 +119,8 @@ def assign(instances: Instances) -> Duties:
         centres = np.arange(side_px // stride) * stride + stride // 2
         grid = np.ix_(centres, centres)
         owner = instances.ids[grid].astype(np.int64).ravel()
-        told = (sides[owner] >= low) & (sides[owner] < high)
-        owners.append(np.where(owner == 0, IGNORED, np.where(told, owner, NOTHING)))
+        fits = (sides[owner] >= low) & (sides[owner] < high)
+        owners.append(np.where(owner == 0, IGNORED, np.where(fits, owner, NOTHING)))
         priors.append(depth[grid].ravel())
         first.append(first[-1] + owner.size)
     duties = Duties(np.concatenate(owners), np.concatenate(priors).astype(np.float32))
@@ -151,11 +152,10 @@ def _adopt(
         duties.owners[anchor], duties.priors[anchor] = index, 1.0
 
 
-def cell_masks(instances: Instances) -> NDArray[np.uint8]:
+def cell_masks(instances: Instances) -> Image:
     """Return how much of each prototype cell an instance covers: [G, h, w], 0 to 255.
 
-    Small things are widened by a pixel first: they would vanish from the cells, and what is not
-    seen cannot be avoided.
+    Small things are widened by a pixel first, or they would vanish from the cells.
     """
     side = instances.ids.shape[0] // CELL_PX
     masks = np.zeros((len(instances), side, side), np.uint8)
@@ -177,7 +177,7 @@ def cell_masks(instances: Instances) -> NDArray[np.uint8]:
 
 
 def roughened(
-    mask: NDArray[np.bool_], rng: np.random.Generator
+    mask: NDArray[np.bool_], rng: Rng
 ) -> NDArray[np.bool_]:  # fmt: skip
     """Return a mask h x w as a network draws it: in cells, off by a little; the same if lost."""
     height, width = mask.shape
