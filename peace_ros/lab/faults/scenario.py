@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from peace_ros.core.domain import PeaceError
 from peace_ros.core.landing import LandingParameters, State
-from peace_ros.lab.faults.bench import FlightBench
+from peace_ros.lab.faults.bench import ENGAGE_S, FlightBench
 from peace_ros.lab.faults.fault import ABSENT, LEAD_BELOW_M, Fault, Moment
 from peace_ros.lab.faults.record import (
     STANDING_M_S,
@@ -72,7 +72,7 @@ class Scenario:
             self._inject()
             self._watch_refusal()
         else:
-            self.bench.engage()
+            self.bench.node.engage(ENGAGE_S)
             self.engaged_s = time.monotonic()
             if self.fault.lead is not None:
                 self._await_moment(Moment(below_m=LEAD_BELOW_M))
@@ -116,7 +116,7 @@ class Scenario:
     def _watch_refusal(self) -> None:
         """The fault is there before the engagement: ask once, and take the answer."""
         self.bench.watch(self.fault.lasts_s)
-        answer = self.bench.node.engage(10.0)
+        answer = self.bench.node.ask_to_engage()
         self.record.refusal = answer or None
 
     def _watch_fault(self) -> None:

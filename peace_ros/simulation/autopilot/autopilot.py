@@ -8,7 +8,6 @@ import threading
 import time
 from collections.abc import Callable
 from math import radians
-from types import TracebackType
 from typing import final
 
 from peace_ros.core.domain.errors import VehicleError
@@ -73,12 +72,7 @@ class AutopilotSim:
         self.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
     @property

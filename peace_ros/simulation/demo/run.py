@@ -191,7 +191,7 @@ def _fly(run: _Run, monitor: Monitor, group: ProcessGroup) -> Ending:
     run.phase = 'engaging the landing node'
     status = monitor.heard(STATUS)
     _wait(run, monitor, group, lambda: monitor.heard(STATUS) > status, 'landing/status')
-    _beside(monitor, group, lambda: _engage(monitor))
+    _beside(monitor, group, lambda: monitor.engage(_ENGAGE_S))
     run.phase = 'flown by the landing node'
     return _follow(run, monitor, group)
 
@@ -212,23 +212,6 @@ def _measure_speed(run: _Run, monitor: Monitor, group: ProcessGroup) -> None:
     heatmap_hz = (monitor.heard(HEATMAP) - begin) / _MEASURE_S / run.speed
     if heatmap_hz < LEAST_HEATMAP_HZ:
         raise _TooSlow(heatmap_hz)
-
-
-def _engage(monitor: Monitor) -> None:
-    """Engage; right after the climb the map may still be waiting for its first heatmap."""
-    deadline = time.monotonic() + _ENGAGE_S
-    while not _is_engaged(monitor, is_last=time.monotonic() > deadline):
-        time.sleep(0.5)
-
-
-def _is_engaged(monitor: Monitor, *, is_last: bool) -> bool:
-    try:
-        monitor.engage()
-    except VehicleError:
-        if is_last:
-            raise
-        return False
-    return True
 
 
 def _follow(run: _Run, monitor: Monitor, group: ProcessGroup) -> Ending:
