@@ -161,7 +161,7 @@ class BagReader:
     def _unreadable(self, error: Exception) -> RecordingError:
         return RecordingError(
             f'bag {self.path} cannot be read ({type(error).__name__}: {error}): give an intact '
-            'bag folder, .mcap or .db3 (ros2 bag reindex may mend it)'
+            'bag folder, .mcap or .db3 (ros2 bag reindex may repair it)'
         )
 
 

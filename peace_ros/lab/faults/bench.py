@@ -31,7 +31,7 @@ ENGAGE_S = 20.0
 _LOOK_S = 0.02
 _READY_HEATMAPS = 2
 _GRACE_S = 6.0
-"""A node that was started anew may be silent for so long."""
+"""A restarted node may be silent for this long."""
 MODULES = {
     'autopilot_sim': 'peace_ros.lab.faults.autopilot',
     'satellite_view': 'peace_ros.simulation.nodes.satellite_view',
@@ -145,7 +145,7 @@ class FlightBench:
         self.processes.send(name, signal.SIGSTOP)
 
     def resume(self, name: str) -> None:
-        """Let it go on."""
+        """Let it run again."""
         self.processes.send(name, signal.SIGCONT)
         if name == 'landing':
             self.silence_ends()
@@ -156,11 +156,11 @@ class FlightBench:
         self.processes.stop(name)
 
     def silence_begins(self) -> None:
-        """From now on the landing node is meant to say nothing."""
+        """From now on the landing node is expected to be silent."""
         self.losses.silences.append(_Silence(time.monotonic()))
 
     def silence_ends(self) -> None:
-        """From now on it speaks again, after a moment."""
+        """From now on it publishes its status again, after a moment."""
         for each in self.losses.silences:
             each.resumed_s = each.resumed_s or time.monotonic()
 

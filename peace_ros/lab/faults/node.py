@@ -151,7 +151,7 @@ class BenchNode(Listener):
         self._stall.publish(Float64(data=seconds))
 
     def fail_model(self, fault: str) -> None:
-        """Tell the segmentation node what its model shall do; empty: work."""
+        """Tell the segmentation node how its model has to fail; empty: not at all."""
         self._model.publish(String(data=fault))
 
     def _relay(self, name: str) -> Any:

@@ -31,7 +31,7 @@ _MOMENT_S = 90.0
 """How long the landing may take to come to the moment of the injection."""
 _MOVING_M_S = 0.7
 _AFTER_S = 1.0
-"""The observation goes on for this long after the recovery, and after what stays for good."""
+"""The observation goes on for this long after the recovery."""
 _STAY_S = 3.0
 _PAUSE_S = 0.3
 """The relay runs every 10 ms and the vehicle publishes every 20 ms: a machine that lets one of
@@ -223,7 +223,7 @@ def unsafe_ground(
     """Return why the ground below the vehicle is unsafe at a moment of the steady clock."""
     pose = bench.node.pose_near(at_s)
     if pose is None:
-        return 'nobody knows where the vehicle was'
+        return 'the position of the vehicle is not known'
     radius_m = LandingParameters().safety_radius_m
     verdict = judge_ground(camera, pose, radius_m)
     if verdict.safe is False:

@@ -84,7 +84,7 @@ def gps_loss(sim: AutopilotSim, *, stale: bool = False) -> None:
 
     Args:
         sim: The simulation.
-        stale: LOCAL_POSITION_NED goes on with the last numbers instead of stopping.
+        stale: LOCAL_POSITION_NED continues with the last numbers instead of stopping.
     """
     sim.lose_gps(stale=stale)
 
@@ -153,7 +153,7 @@ def silence(sim: AutopilotSim, *, seconds: float = 0.0) -> None:
 
     Args:
         sim: The simulation.
-        seconds: Wall time after which it mends itself; 0: until ``mend``.
+        seconds: Wall time after which the line works again; 0: until ``mend``.
     """
     sim.disturbance.silent_until_s = time.monotonic() + seconds if seconds > 0.0 else float('inf')
 
@@ -185,7 +185,7 @@ def line(
 
 @_fault
 def reboot(sim: AutopilotSim, *, in_the_air: bool = True) -> None:
-    """Restart the autopilot: boot time, intervals, mode and arming begin anew.
+    """Restart the autopilot: boot time, intervals, mode and arming are reset.
 
     Args:
         sim: The simulation.

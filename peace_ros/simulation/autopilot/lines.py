@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The lines on which a simulated autopilot is heard and tells: UDP, TCP, and its serial ports.
+"""The sockets of a simulated autopilot: UDP, TCP, and its serial ports.
 
 A serial port is a TCP port that serves one client at a time, as those of ArduPilot's own
 simulation (5760, 5762, 5763): a second client is connected, and hears nothing, until the first has
@@ -26,7 +26,7 @@ _SERIAL = 'serial'
 
 
 class TcpPort:
-    """A listening port and its clients; what is told to nobody is lost.
+    """A listening port and its clients.
 
     Raises:
         VehicleError: The port is taken.
@@ -118,7 +118,7 @@ class Lines:
         self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._ports: list[TcpPort] = []
         self.waits_for_client = bool(serial_port)
-        """Nobody has come to the first serial port yet, and the boot waits for that."""
+        """The first serial port has had no client yet, and the boot waits for one."""
         try:
             self._udp.bind((host, port))
             self._udp.setblocking(False)

@@ -83,7 +83,7 @@ class MavlinkServer:
 
     @property
     def waits_for_client(self) -> bool:
-        """The autopilot does not boot before somebody is there."""
+        """The autopilot boots when the first client has come."""
         return self._lines.waits_for_client
 
     @property

@@ -178,7 +178,7 @@ class Monitor(Listener):
             self._add_reported_pose(status)
 
     def _add_reported_pose(self, status: Status) -> None:
-        """Take the autopilot's own word for the pose, where nobody publishes a better one."""
+        """Use the pose that the autopilot reports, where no better one is published."""
         north_m, east_m = status.number('north_m'), status.number('east_m')
         altitude_m = status.number('altitude_agl_m')
         if north_m is not None and east_m is not None and altitude_m is not None:

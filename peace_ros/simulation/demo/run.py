@@ -215,7 +215,7 @@ def _measure_speed(run: _Run, monitor: Monitor, group: ProcessGroup) -> None:
 
 
 def _follow(run: _Run, monitor: Monitor, group: ProcessGroup) -> Ending:
-    """Wait for the outcome of the landing node, or for the end of the patience."""
+    """Wait for the outcome of the landing node, but not longer than the limit."""
     deadline = time.monotonic() + run.options.timeout_s
     while time.monotonic() < deadline:
         group.check()
