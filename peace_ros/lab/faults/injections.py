@@ -31,17 +31,6 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Nothing:
-    """A flight without a fault, to compare with."""
-
-    def begin(self, _bench: FlightBench) -> None:
-        """Do nothing."""
-
-    def end(self, _bench: FlightBench) -> None:
-        """Do nothing."""
-
-
-@dataclass(frozen=True)
 class Topic:
     """Something happens to the messages of a topic."""
 
