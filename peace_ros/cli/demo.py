@@ -23,7 +23,7 @@ def demo(
     labels: Annotated[
         Path | None,
         typer.Option(
-            help='Label raster of --world; <name>_label.png beside it is found by itself.'
+            help='Label raster of --world; <name>_label.png beside it is found without this.'
         ),
     ] = None,
     start: Annotated[
@@ -46,7 +46,7 @@ def demo(
     ] = None,
     mavlink: Annotated[
         str | None,
-        typer.Option(metavar='URL', help='An autopilot that is already there.'),
+        typer.Option(metavar='URL', help='An autopilot that already runs.'),
     ] = None,
     pose_mavlink: Annotated[
         str | None,

@@ -35,7 +35,6 @@ from peace_ros.core.domain import RecordingError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
-    from types import TracebackType
 
     from rosbags.interfaces import Connection
     from typing_extensions import Self
@@ -92,12 +91,7 @@ class BagReader:
         self._reader = reader
         return self
 
-    def __exit__(
-        self,
-        error_type: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Close the file."""
         reader, self._reader = self._reader, None
         if reader is not None:
@@ -167,7 +161,7 @@ class BagReader:
     def _unreadable(self, error: Exception) -> RecordingError:
         return RecordingError(
             f'bag {self.path} cannot be read ({type(error).__name__}: {error}): give an intact '
-            'bag folder, .mcap or .db3 (ros2 bag reindex may mend it)'
+            'bag folder, .mcap or .db3 (ros2 bag reindex may repair it)'
         )
 
 
@@ -215,12 +209,7 @@ class BagWriter:
         self._writer = writer
         return self
 
-    def __exit__(
-        self,
-        error_type: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
         """Put the file in its place, or remove every trace of it after an error."""
         writer, self._writer = self._writer, None
         try:

@@ -74,6 +74,14 @@ def wrap(text: str, width_px: int, scale: float) -> list[str]:
     return lines
 
 
+def fitted(image: NDArray[np.uint8], longest_px: int, interpolation: int = cv2.INTER_AREA) -> Image:
+    """Return a picture scaled so that its longer side has a length."""
+    height, width = image.shape[:2]
+    factor = longest_px / max(height, width)
+    size = (max(1, round(width * factor)), max(1, round(height * factor)))
+    return np.asarray(cv2.resize(image, size, interpolation=interpolation), np.uint8)
+
+
 def altitude_colours(
     altitude_m: NDArray[np.float64], low_m: float, high_m: float
 ) -> NDArray[np.uint8]:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,14 +52,7 @@ def draw_contact_sheet(cells: list[Cell], title: str) -> Image:
         lines = canvas.wrap(cell.detail, _CELL_PX, 0.4)
         for k, line in enumerate(lines[:2]):
             canvas.put_text(sheet, line, (left, top + 36 + 16 * k), scale=0.4, colour=canvas.FAINT)
-        picture = _fitted(cell.image_rgb)
+        picture = canvas.fitted(cell.image_rgb, _CELL_PX)
         y = top + _CAPTION_PX
         sheet[y : y + picture.shape[0], left : left + picture.shape[1]] = picture
     return sheet
-
-
-def _fitted(image: NDArray[np.uint8]) -> Image:
-    height, width = image.shape[:2]
-    factor = _CELL_PX / max(height, width)
-    size = (max(1, round(width * factor)), max(1, round(height * factor)))
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)

@@ -97,13 +97,11 @@ def _missing(what: str) -> Image:
 
 def _fit(image: NDArray[np.uint8], interpolation: int) -> Image:
     """Scale to the cell, bars above and below where the picture is wider than high."""
-    height, width = image.shape[:2]
-    factor = _CELL_PX / max(height, width)
-    size = (max(1, round(width * factor)), max(1, round(height * factor)))
-    small = cv2.resize(image, size, interpolation=interpolation)
-    cell = np.full((_CELL_PX, _CELL_PX, 3), canvas.PAPER, np.uint8)
-    top, left = (_CELL_PX - size[1]) // 2, (_CELL_PX - size[0]) // 2
-    cell[top : top + size[1], left : left + size[0]] = small
+    small = canvas.fitted(image, _CELL_PX, interpolation)
+    height, width = small.shape[:2]
+    cell = canvas.blank(_CELL_PX, _CELL_PX)
+    top, left = (_CELL_PX - height) // 2, (_CELL_PX - width) // 2
+    cell[top : top + height, left : left + width] = small
     return cell
 
 

@@ -229,7 +229,7 @@ def _draw_legend(panel: Image, top: int, scene: TrajectoryScene) -> int:
         y += 30
         canvas.outlined_circle(panel, (36, y - 6), 10, (80, 230, 255))
         canvas.outlined_circle(panel, (36, y - 6), 3, (80, 230, 255))
-        canvas.put_text(panel, 'chosen site, believed clearance', (64, y), scale=0.52)
+        canvas.put_text(panel, 'chosen site, estimated clearance', (64, y), scale=0.52)
     if scene.hand_over is not None:
         y += 30
         canvas.cross(panel, (36, y - 6), 16, _verdict_colour(scene.safe))
@@ -284,20 +284,18 @@ def _draw_inset(panel: Image, view: _View, scene: TrajectoryScene, top: int) -> 
     room = min(_MAP_PX - top - 20, _PANEL_PX - 60)
     if room < 60:
         return
-    factor = room / max(height, width)
-    size = (max(1, round(width * factor)), max(1, round(height * factor)))
-    small = np.asarray(cv2.resize(scene.world_rgb, size, interpolation=cv2.INTER_AREA), np.uint8)
-    per_px = scene.gsd_m / factor
+    small = canvas.fitted(scene.world_rgb, room)
+    size = (small.shape[1], small.shape[0])
+    per_px = scene.gsd_m * max(height, width) / room
 
     def at(east_m: float, north_m: float) -> Point:
         return round(size[0] / 2 + east_m / per_px), round(size[1] / 2 - north_m / per_px)
 
     half = view.span_m / 2
     east, north = view.centre
-    cv2.rectangle(small, at(east - half, north + half), at(east + half, north - half), (0, 0, 0), 3)
-    cv2.rectangle(
-        small, at(east - half, north + half), at(east + half, north - half), (255, 255, 255), 1
-    )
+    corners = at(east - half, north + half), at(east + half, north - half)
+    cv2.rectangle(small, *corners, (0, 0, 0), 3)
+    cv2.rectangle(small, *corners, (255, 255, 255), 1)
     panel[top : top + size[1], 30 : 30 + size[0]] = small
     text = f'whole world, {width * scene.gsd_m:.0f} x {height * scene.gsd_m:.0f} m'
     canvas.put_text(panel, text, (30, top - 8), scale=0.45, colour=canvas.FAINT)

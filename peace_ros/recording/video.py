@@ -16,7 +16,6 @@ from peace_ros.core.domain import Frame, Pose, RecordingError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from types import TracebackType
 
     from typing_extensions import Self
 
@@ -165,12 +164,7 @@ class VideoWriter:
             )
         self._writer.write(cv2.cvtColor(image_rgb, cv2.COLOR_RGB2BGR))
 
-    def __exit__(
-        self,
-        error_type: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
         """Put the file in its place, or remove it after an error."""
         writer, self._writer = self._writer, None
         if writer is None:

@@ -23,7 +23,7 @@ class World:
     image_rgb: NDArray[np.uint8]
     """Height x width x 3, RGB."""
     labels: NDArray[np.uint8] | None
-    """Height x width of :class:`peace_ros.core.domain.Label`, or None where nobody knows."""
+    """Height x width of :class:`peace_ros.core.domain.Label`, or None where they are not known."""
     gsd_m: float
     """Ground sampling distance: metres per pixel, both ways."""
     name: str

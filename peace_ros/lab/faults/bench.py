@@ -20,17 +20,18 @@ from peace_ros.lab.faults.record import Ended
 from peace_ros.lab.faults.worlds import FaultWorld
 from peace_ros.simulation.autopilot.faults import Answer, FaultClient
 from peace_ros.simulation.demo.isolation import free_udp_port
+from peace_ros.simulation.demo.nodes import ros_arguments
 from peace_ros.simulation.demo.processes import ProcessGroup, log_tail
 
 CAMERA_HZ = 6.0
 START_M = 50.0
 """Altitude at which every flight begins: the safe altitude of the defaults."""
 _READY_S = 60.0
-_ENGAGE_S = 20.0
+ENGAGE_S = 20.0
 _LOOK_S = 0.02
 _READY_HEATMAPS = 2
 _GRACE_S = 6.0
-"""A node that was started anew may be silent for so long."""
+"""A restarted node may be silent for this long."""
 MODULES = {
     'autopilot_sim': 'peace_ros.lab.faults.autopilot',
     'satellite_view': 'peace_ros.simulation.nodes.satellite_view',
@@ -144,7 +145,7 @@ class FlightBench:
         self.processes.send(name, signal.SIGSTOP)
 
     def resume(self, name: str) -> None:
-        """Let it go on."""
+        """Let it run again."""
         self.processes.send(name, signal.SIGCONT)
         if name == 'landing':
             self.silence_ends()
@@ -155,11 +156,11 @@ class FlightBench:
         self.processes.stop(name)
 
     def silence_begins(self) -> None:
-        """From now on the landing node is meant to say nothing."""
+        """From now on the landing node is expected to be silent."""
         self.losses.silences.append(_Silence(time.monotonic()))
 
     def silence_ends(self) -> None:
-        """From now on it speaks again, after a moment."""
+        """From now on it publishes its status again, after a moment."""
         for each in self.losses.silences:
             each.resumed_s = each.resumed_s or time.monotonic()
 
@@ -214,18 +215,6 @@ class FlightBench:
                     raise
                 continue
             return
-
-    def engage(self) -> None:
-        """Engage; right after the start the map may still be waiting for its first heatmap.
-
-        Raises:
-            VehicleError: it refuses for too long.
-        """
-        deadline = time.monotonic() + _ENGAGE_S
-        while problem := self.node.engage(_ENGAGE_S):
-            if time.monotonic() > deadline:
-                raise VehicleError(f'the landing node refuses to engage: {problem}')
-            time.sleep(0.3)
 
     def watch(self, limit_s: float, holds: Callable[[], bool] = lambda: False) -> bool:
         """Note what ends until something holds, but for so long at most; tell whether it holds."""
@@ -289,14 +278,10 @@ class FlightBench:
         elif name == 'landing':
             parameters = {'mavlink': f'udpout:127.0.0.1:{self.line.port}'}
             parameters.update(self._key('vehicle.'))
-        words = ['--ros-args']
-        if name in {'segmentation', 'prompt_generator', 'landing'}:
-            words += ['--params-file', str(preset)]
-        for key, value in {**clock, **parameters, **given}.items():
-            words += ['-p', f'{key}:={_yaml(value)}']
-        for key, topic in remaps.items():
-            words += ['-r', f'{key}:={topic}']
-        return words
+        reads_preset = name in {'segmentation', 'prompt_generator', 'landing'}
+        return ros_arguments(
+            {**clock, **parameters, **given}, preset if reads_preset else None, remaps
+        )
 
     def _key(self, group: str) -> dict[str, object]:
         """Return the parameter that names the key of the line, none where it is open."""
@@ -318,12 +303,3 @@ class FlightBench:
             'start_y': ground.origin_north_m,
             'rate': CAMERA_HZ,
         }
-
-
-def _yaml(value: object) -> str:
-    """Write a value so that ROS reads back the same type."""
-    if isinstance(value, bool):
-        return 'true' if value else 'false'
-    if isinstance(value, str):
-        return "'" + value.replace("'", "''") + "'"
-    return repr(value)

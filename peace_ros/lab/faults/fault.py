@@ -27,14 +27,14 @@ ABSENT = ''
 
 
 class Injection(Protocol):
-    """Something that goes wrong; unknown to the companion."""
+    """Something that goes wrong; the companion is not told."""
 
     def begin(self, bench: FlightBench, /) -> None:
-        """Let it go wrong."""
+        """Begin."""
         ...
 
     def end(self, bench: FlightBench, /) -> None:
-        """Mend it."""
+        """End it."""
         ...
 
 
@@ -124,7 +124,7 @@ class Fault:
     """The fault ends after this; and earlier when ``until_reached`` and the state is there."""
     until_reached: bool = False
     lead: Injection | None = None
-    """Brings a landing below 45 m to the state of the moment; it is mended with the fault."""
+    """Brings a landing below 45 m to the state of the moment; it ends with the fault."""
     setting: FlightSetting = FlightSetting()
     note: str = ''
     """What the test of this fault does not show."""

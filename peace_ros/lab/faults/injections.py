@@ -31,17 +31,6 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Nothing:
-    """A flight without a fault, to compare with."""
-
-    def begin(self, _bench: FlightBench) -> None:
-        """Do nothing."""
-
-    def end(self, _bench: FlightBench) -> None:
-        """Do nothing."""
-
-
-@dataclass(frozen=True)
 class Topic:
     """Something happens to the messages of a topic."""
 
@@ -93,7 +82,7 @@ class DisturbedLine:
             bench.line.down = self.down()
 
     def end(self, bench: FlightBench) -> None:
-        """Mend the line."""
+        """Restore the line."""
         bench.line.mend()
 
 
@@ -114,7 +103,7 @@ class Killed:
 
 @dataclass(frozen=True)
 class Suspended:
-    """A process stands still."""
+    """A process gets no processor time."""
 
     process: str
 
@@ -123,7 +112,7 @@ class Suspended:
         bench.suspend(self.process)
 
     def end(self, bench: FlightBench) -> None:
-        """Let it go on."""
+        """Let it run again."""
         bench.resume(self.process)
 
 
@@ -164,7 +153,7 @@ class BadModel:
 
 @dataclass(frozen=True)
 class BadBundle:
-    """The segmentation node is started with a bundle that was changed behind its back."""
+    """The segmentation node is started with a damaged bundle."""
 
     honest: bool
     """The manifest has the checksum of the changed file: the damage shows only in numbers."""
@@ -180,7 +169,7 @@ class BadBundle:
 
 
 def damaged_bundle(folder: Path, *, honest: bool) -> Path:
-    """Copy the shipped CLIPSeg bundle and overwrite weights with bytes that are no number."""
+    """Copy the shipped CLIPSeg bundle and overwrite weights with NaN."""
     shutil.copytree(models_dir() / 'clipseg-small', folder)
     manifest_file = folder / 'manifest.json'
     manifest = json.loads(manifest_file.read_text(encoding='utf-8'))
@@ -199,7 +188,7 @@ def damaged_bundle(folder: Path, *, honest: bool) -> Path:
 
 @dataclass(frozen=True)
 class ClockStep:
-    """``/clock`` and with it the stamps of the camera step; for good."""
+    """``/clock`` and with it the stamps of the camera step, and stay so."""
 
     seconds: float
 
@@ -208,7 +197,7 @@ class ClockStep:
         bench.node.clock_step_ns += round(self.seconds * 1e9)
 
     def end(self, bench: FlightBench) -> None:
-        """The clock goes on from where it is."""
+        """The clock continues from where it is."""
 
 
 @dataclass

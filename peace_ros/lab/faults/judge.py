@@ -40,7 +40,7 @@ class Row:
     recovered_s: float | None
     """From the end of the fault to the state of the recovery."""
     still_after_s: float
-    """From the injection until the vehicle truly descended no more."""
+    """From the injection until the vehicle truly stopped descending."""
     max_descent_m_s: float
     """Highest true downward speed from the moment on at which it has to be still."""
     lowest_m: float | None
@@ -231,7 +231,7 @@ def _spares(expected: Expected, record: Record) -> Iterator[str]:
     if limit_s is None:
         return
     if over_s is None:
-        yield 'nobody walked below'
+        yield 'no person walked below'
     elif over_s > limit_s:
         yield f'descended over the person for {over_s:.1f} s, {limit_s:g} s allowed'
 
@@ -254,7 +254,7 @@ def _stays(expected: Expected, record: Record) -> Iterator[str]:
     begin_s = record.fault_end_s
     again = record.first(expected.recovers, begin_s) if expected.recovers else None
     if again is not None:
-        # A node that was started anew says something else until it is ready.
+        # A restarted node has another state until it is ready.
         begin_s = again.at_s
     after = [s for s in record.said if s.at_s > begin_s + CHANGE_S]
     if not after:

@@ -11,18 +11,14 @@ from bisect import bisect_left
 from collections import OrderedDict, deque
 from typing import Any
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_msgs.msg import Float64, String
-from std_srvs.srv import Trigger
 
-from peace_ros.core.domain import Pose, VehicleError
+from peace_ros.core.domain import Pose
 from peace_ros.lab.faults.record import Said, TruthSample
 from peace_ros.lab.faults.tamper import Tamper, untouched
 from peace_ros.nodes import qos
@@ -32,6 +28,7 @@ from peace_ros.nodes.messages import (
     pose_from_message,
     time_from_ns,
 )
+from peace_ros.simulation.demo.listener import Listener
 
 IMAGE, HEATMAP, PROMPT = 'image', 'heatmap', 'prompt'
 RAW = 'raw/'
@@ -48,10 +45,9 @@ _KEPT_POSES = 6000
 _KEPT_TURNS = 30_000
 _NEAR_NS = 300_000_000
 _RELEASE_S = 0.01
-_JOIN_S = 5.0
 
 
-class BenchNode:
+class BenchNode(Listener):
     """Spins in a thread of its own; the lists are read under :attr:`lock`.
 
     All times are of the steady clock. Those of status and ground truth are the times at which they
@@ -80,40 +76,21 @@ class BenchNode:
         """Zero of the steady clock, on the wall clock."""
         self._queue: list[tuple[float, int, str, Any]] = []
         self._count = 0
-        self._failure: Exception | None = None
-        rclpy.init(args=[], signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
-        self._node = Node('fault_bench')
+        super().__init__('fault_bench')
         self._out = {
-            name: self._node.create_publisher(kind, name, out)
+            name: self.node.create_publisher(kind, name, out)
             for name, (kind, _, out) in _RELAYED.items()
         }
         for name, (kind, into, _) in _RELAYED.items():
-            self._node.create_subscription(kind, RAW + name, self._relay(name), into)
-        self._clock_out = self._node.create_publisher(Clock, '/clock', qos.CLOCK)
-        self._node.create_subscription(Clock, RAW + 'clock', self._on_clock, qos.CLOCK)
-        self._node.create_subscription(
-            DiagnosticArray, 'landing/status', self._on_status, _EVIDENCE
-        )
-        self._node.create_subscription(PoseStamped, 'ground_truth/pose', self._on_pose, _EVIDENCE)
-        self._stall = self._node.create_publisher(Float64, 'fault/stall', qos.RESULT)
-        self._model = self._node.create_publisher(String, 'fault/model', qos.RESULT)
-        self._engage = self._node.create_client(Trigger, 'landing/engage')
-        self._node.create_timer(_RELEASE_S, self._release)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._thread = threading.Thread(target=self._spin, name='fault_bench', daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Stop listening."""
-        self._executor.shutdown()
-        rclpy.try_shutdown()
-        self._thread.join(timeout=_JOIN_S)
-
-    def check(self) -> None:
-        """Raise what ended the thread, if anything did."""
-        if self._failure is not None:
-            raise self._failure
+            self.node.create_subscription(kind, RAW + name, self._relay(name), into)
+        self._clock_out = self.node.create_publisher(Clock, '/clock', qos.CLOCK)
+        self.node.create_subscription(Clock, RAW + 'clock', self._on_clock, qos.CLOCK)
+        self.node.create_subscription(DiagnosticArray, 'landing/status', self._on_status, _EVIDENCE)
+        self.node.create_subscription(PoseStamped, 'ground_truth/pose', self._on_pose, _EVIDENCE)
+        self._stall = self.node.create_publisher(Float64, 'fault/stall', qos.RESULT)
+        self._model = self.node.create_publisher(String, 'fault/model', qos.RESULT)
+        self.node.create_timer(_RELEASE_S, self._release)
+        self.start()
 
     def forget(self) -> None:
         """Forget what was heard, and hand everything on again."""
@@ -174,36 +151,8 @@ class BenchNode:
         self._stall.publish(Float64(data=seconds))
 
     def fail_model(self, fault: str) -> None:
-        """Tell the segmentation node what its model shall do; empty: work."""
+        """Tell the segmentation node how its model has to fail; empty: not at all."""
         self._model.publish(String(data=fault))
-
-    def engage(self, limit_s: float) -> str:
-        """Call the landing node's service; return why it refuses, empty when it began.
-
-        Raises:
-            VehicleError: it does not answer in time.
-        """
-        deadline = time.monotonic() + limit_s
-        if not self._engage.wait_for_service(timeout_sec=limit_s):
-            raise VehicleError(f'service landing/engage did not appear within {limit_s:g} s')
-        future = self._engage.call_async(Trigger.Request())
-        while not future.done():
-            if time.monotonic() > deadline:
-                raise VehicleError(f'service landing/engage did not answer within {limit_s:g} s')
-            time.sleep(0.005)
-        answer = future.result()
-        if answer is None:
-            raise VehicleError('service landing/engage gave no answer')
-        return '' if answer.success else str(answer.message) or 'without a reason'
-
-    def _spin(self) -> None:
-        try:
-            self._executor.spin()
-        except ExternalShutdownException:
-            return
-        except Exception as error:
-            # Without this thread everything would look as if it stood still.
-            self._failure = error
 
     def _relay(self, name: str) -> Any:
         def take(message: Any) -> None:

@@ -92,7 +92,7 @@ class Record:
     over_person_s: float | None = None
     """How long the vehicle descended with a person below; None where there is none."""
     lost_control_s: float = inf
-    """When somebody else than the companion began to fly."""
+    """When the companion lost control of the vehicle."""
     trouble: str = ''
     """Why the fault could not be tried at all."""
     slow: str = ''

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from peace_ros.core.domain import PeaceError
 from peace_ros.core.landing import LandingParameters, State
-from peace_ros.lab.faults.bench import FlightBench
+from peace_ros.lab.faults.bench import ENGAGE_S, FlightBench
 from peace_ros.lab.faults.fault import ABSENT, LEAD_BELOW_M, Fault, Moment
 from peace_ros.lab.faults.record import (
     STANDING_M_S,
@@ -31,7 +31,7 @@ _MOMENT_S = 90.0
 """How long the landing may take to come to the moment of the injection."""
 _MOVING_M_S = 0.7
 _AFTER_S = 1.0
-"""The observation goes on for this long after the recovery, and after what stays for good."""
+"""The observation goes on for this long after the recovery."""
 _STAY_S = 3.0
 _PAUSE_S = 0.3
 """The relay runs every 10 ms and the vehicle publishes every 20 ms: a machine that lets one of
@@ -72,7 +72,7 @@ class Scenario:
             self._inject()
             self._watch_refusal()
         else:
-            self.bench.engage()
+            self.bench.node.engage(ENGAGE_S)
             self.engaged_s = time.monotonic()
             if self.fault.lead is not None:
                 self._await_moment(Moment(below_m=LEAD_BELOW_M))
@@ -116,7 +116,7 @@ class Scenario:
     def _watch_refusal(self) -> None:
         """The fault is there before the engagement: ask once, and take the answer."""
         self.bench.watch(self.fault.lasts_s)
-        answer = self.bench.node.engage(10.0)
+        answer = self.bench.node.ask_to_engage()
         self.record.refusal = answer or None
 
     def _watch_fault(self) -> None:
@@ -223,7 +223,7 @@ def unsafe_ground(
     """Return why the ground below the vehicle is unsafe at a moment of the steady clock."""
     pose = bench.node.pose_near(at_s)
     if pose is None:
-        return 'nobody knows where the vehicle was'
+        return 'the position of the vehicle is not known'
     radius_m = LandingParameters().safety_radius_m
     verdict = judge_ground(camera, pose, radius_m)
     if verdict.safe is False:

@@ -72,7 +72,7 @@ class FailingSegmenter:
 
 
 class FailingSegmentationNode(SegmentationNode):
-    """Listens to what shall go wrong."""
+    """Fails as the topic ``fault/model`` says."""
 
     def __init__(self, **options: Any) -> None:
         self._failing: FailingSegmenter | None = None

@@ -19,7 +19,7 @@ from rich.console import Console
 from peace_ros.core.domain import PeaceError, VehicleError
 from peace_ros.core.landing import State
 from peace_ros.lab.faults import report, worlds
-from peace_ros.lab.faults.bench import FlightBench
+from peace_ros.lab.faults.bench import ENGAGE_S, FlightBench
 from peace_ros.lab.faults.fault import FlightSetting
 from peace_ros.lab.faults.node import BenchNode
 from peace_ros.lab.faults.scenario import unsafe_ground
@@ -149,7 +149,7 @@ def _land(bench: FlightBench, seen: Soak, began: float) -> None:
     random = np.random.default_rng(seen.landings)
     north_m, east_m = (float(each) for each in random.uniform(-_START_M, _START_M, size=2))
     bench.put_vehicle(north_m, east_m)
-    bench.engage()
+    bench.node.engage(ENGAGE_S)
     engaged_s = time.monotonic()
     takes_over = seen.landings % 3 == 0
     deadline = engaged_s + _LANDING_S

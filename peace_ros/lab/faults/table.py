@@ -56,15 +56,17 @@ flies; a test keeps them equal. {len(FAULTS)} faults.
 
 Each fault is put into a landing of the real processes: camera, networks, landing node and
 autopilot are separate processes that talk over DDS and MAVLink; relays in between lose, delay or
-damage what passes, and nobody tells the landing node. A flight begins at {START_M:g} m, with
+damage what passes, and the landing node is not told. A flight begins at {START_M:g} m, with
 {CAMERA_HZ:g} frames per second and a static prompt where the fault is not about prompts. The
-landing node is started anew for each fault; the others are when a fault has ended them.
+landing node is restarted for each fault; the others only after a fault has ended them.
 
-The judge looks at the true position of the vehicle and at the set-points on the wire (timed by the
-kernel), not only at what the landing node says. Whatever goes wrong, a fault fails when
+The verdict rests on the true position of the vehicle and on the set-points on the wire (timed by
+the kernel), not only on what the landing node says. Times are those of publishing, so that a busy
+machine does not change them; a flight on a machine that is too slow for the limits is repeated
+once, and the report says so. A fault fails when
 
-- the vehicle is handed over where the labels of the world are unsafe, or a person stands,
-- a process ends by itself that should not, or ends without a sentence,
+- the vehicle is handed over where the labels of the world are unsafe, or a person is,
+- a process ends unexpectedly, or without a sentence,
 - the landing node says nothing for more than {SILENCE_S:g} s although it runs,
 - the vehicle sinks more than {OVERSHOOT_M:g} m below the {FLOOR_M:g} m of the hand-over,
 - a set-point is not exactly zero in IDLE, WAITING, HANDOVER, HOLD or ABORTED,

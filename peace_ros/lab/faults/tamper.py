@@ -76,7 +76,7 @@ def filled(level: int) -> Tamper:
 
 
 def noisy(seed: int = 0) -> Tamper:
-    """Replace every pixel by chance."""
+    """Give every pixel a random value."""
     random = np.random.default_rng(seed)
 
     def tamper(message: Any) -> Iterable[Late]:

@@ -8,7 +8,6 @@ import threading
 import time
 from collections.abc import Callable
 from math import radians
-from types import TracebackType
 from typing import final
 
 from peace_ros.core.domain.errors import VehicleError
@@ -29,7 +28,7 @@ MAX_TURN_S = 0.1
 CATCH_UP = 1.5
 """How much faster than ``speed`` the simulated clock runs while it is behind."""
 MAX_LAG_S = 2.0
-"""Wall time that is made up for; beyond it the simulated clock has run slow for good."""
+"""Wall time that is made up for; beyond it the simulated clock stays behind."""
 _FLYING_M = 5.0
 
 
@@ -73,12 +72,7 @@ class AutopilotSim:
         self.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
     @property
@@ -88,7 +82,7 @@ class AutopilotSim:
 
     @property
     def time_ns(self) -> int:
-        """Simulated clock; it goes on through a reboot of the autopilot."""
+        """Simulated clock; a reboot of the autopilot does not reset it."""
         with self.lock:
             return round((self._clock_offset_s + self._flight.time_s) * 1e9)
 
@@ -194,7 +188,7 @@ class AutopilotSim:
             self._flight.turn_stick(yaw_rate_rad_s)
 
     def lose_gps(self, *, stale: bool = False) -> None:
-        """Take GPS away; LOCAL_POSITION_NED stops, or goes on with old numbers when ``stale``."""
+        """Take GPS away; LOCAL_POSITION_NED stops, or continues with old numbers when ``stale``."""
         with self.lock:
             self._flight.lose_gps(stale=stale)
 
@@ -209,7 +203,7 @@ class AutopilotSim:
             self._flight.lose_radio()
 
     def silence(self, *, silent: bool = True) -> None:
-        """Cut the MAVLink line in both directions, or mend it."""
+        """Cut the MAVLink line in both directions, or restore it."""
         with self.lock:
             self.disturbance.silent_until_s = float('inf') if silent else 0.0
 

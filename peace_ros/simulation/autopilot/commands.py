@@ -66,7 +66,7 @@ _COMMANDS: dict[int, Callable[[Flight, Params], Result]] = {
 
 
 def run_message(flight: Flight, message: Any) -> bool:
-    """Take a set-point or navigation message; False when it is none."""
+    """Take a set-point or navigation message; False when it is another one."""
     handler = _MESSAGES.get(message.get_msgId())
     if handler is None:
         return False

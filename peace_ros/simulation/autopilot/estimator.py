@@ -69,7 +69,7 @@ class Estimator:
             )
 
     def use_source(self, source: int) -> bool:
-        """Switch the source set (1: GPS, 2: external navigation); False when there is none such."""
+        """Switch the source set (1: GPS, 2: external navigation); False for other numbers."""
         if source not in {GPS_SOURCE, EXTERNAL_SOURCE}:
             return False
         self.source = source
@@ -78,7 +78,7 @@ class Estimator:
         return True
 
     def step(self, time_s: float) -> bool:
-        """Look at the clock; True when the position has been lost for as long as is endured."""
+        """Look at the clock; True when the position has been lost for too long (EKF failsafe)."""
         if self.has_position(time_s):
             self._had_position = True
             self._lost_s = None

@@ -34,7 +34,7 @@ class FaultClient:
         """Put one fault in; as :func:`peace_ros.simulation.autopilot.faults.inject`.
 
         Raises:
-            VehicleError: As there, or nobody answers.
+            VehicleError: As there, or no answer comes.
         """
         self._number += 1
         request = json.dumps({'fault': fault, 'id': self._number, **arguments}).encode()

@@ -20,7 +20,7 @@ import time
 from collections.abc import Callable
 from inspect import Parameter, signature
 from math import isinf, radians
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from peace_ros.core.domain.errors import VehicleError
 from peace_ros.simulation.autopilot.disturbance import Disturbance
@@ -31,6 +31,15 @@ if TYPE_CHECKING:
 
 Answer = dict[str, Any]
 __all__ = ['FAULTS', 'Answer', 'FaultClient', 'inject']
+_Function = TypeVar('_Function', bound=Callable[..., Answer | None])
+
+FAULTS: dict[str, Callable[..., Answer | None]] = {}
+"""Name -> function; its keyword arguments are those of :func:`inject`."""
+
+
+def _fault(function: _Function) -> _Function:
+    FAULTS[function.__name__] = function
+    return function
 
 
 def inject(sim: AutopilotSim, fault: str, /, **arguments: Any) -> Answer:
@@ -61,6 +70,7 @@ def inject(sim: AutopilotSim, fault: str, /, **arguments: Any) -> Answer:
         raise VehicleError(f'fault {fault} with {arguments}: {error}') from error
 
 
+@_fault
 def clear(sim: AutopilotSim) -> None:
     """Take every distortion away; what has happened (a reboot, a mode change) stays."""
     sim.disturbance.__dict__.update(vars(Disturbance()))
@@ -68,21 +78,24 @@ def clear(sim: AutopilotSim) -> None:
     sim.pilot_yaw_stick(0.0)
 
 
+@_fault
 def gps_loss(sim: AutopilotSim, *, stale: bool = False) -> None:
     """Lose GPS: 7.4 s later the EKF failsafe lands.
 
     Args:
         sim: The simulation.
-        stale: LOCAL_POSITION_NED goes on with the last numbers instead of stopping.
+        stale: LOCAL_POSITION_NED continues with the last numbers instead of stopping.
     """
     sim.lose_gps(stale=stale)
 
 
+@_fault
 def gps_restore(sim: AutopilotSim) -> None:
     """Give GPS back."""
     sim.restore_gps()
 
 
+@_fault
 def altitude(sim: AutopilotSim, *, kind: str = 'true', offset_m: float = 0.0) -> None:
     """Distort the reported altitude (LOCAL_POSITION_NED.z, GLOBAL_POSITION_INT).
 
@@ -98,6 +111,7 @@ def altitude(sim: AutopilotSim, *, kind: str = 'true', offset_m: float = 0.0) ->
     sim.disturbance.frozen_down_m = sim.flight.position_m[2]
 
 
+@_fault
 def frame(sim: AutopilotSim, *, kind: str = 'ned') -> None:
     """Report LOCAL_POSITION_NED in a wrong frame.
 
@@ -110,11 +124,13 @@ def frame(sim: AutopilotSim, *, kind: str = 'ned') -> None:
     sim.disturbance.frame = kind
 
 
+@_fault
 def position(sim: AutopilotSim, *, north_m: float = 0.0, east_m: float = 0.0) -> None:
     """Let the reported position jump by an offset (an EKF reset); zero ends it."""
     sim.disturbance.position_offset_m = (float(north_m), float(east_m))
 
 
+@_fault
 def telemetry_stop(sim: AutopilotSim, *, messages: tuple[str, ...] | list[str] = ()) -> None:
     """Stop some or all messages of the autopilot; commands are still obeyed and answered.
 
@@ -125,21 +141,24 @@ def telemetry_stop(sim: AutopilotSim, *, messages: tuple[str, ...] | list[str] =
     sim.disturbance.muted = frozenset(messages) or frozenset({'*'})
 
 
+@_fault
 def telemetry_resume(sim: AutopilotSim) -> None:
     """End ``telemetry_stop``."""
     sim.disturbance.muted = frozenset()
 
 
+@_fault
 def silence(sim: AutopilotSim, *, seconds: float = 0.0) -> None:
     """Cut the MAVLink line in both directions.
 
     Args:
         sim: The simulation.
-        seconds: Wall time after which it mends itself; 0: until ``mend``.
+        seconds: Wall time after which the line works again; 0: until ``mend``.
     """
     sim.disturbance.silent_until_s = time.monotonic() + seconds if seconds > 0.0 else float('inf')
 
 
+@_fault
 def mend(sim: AutopilotSim) -> None:
     """End ``silence`` and ``line``."""
     calm = Disturbance()
@@ -147,6 +166,7 @@ def mend(sim: AutopilotSim) -> None:
         setattr(sim.disturbance, name, getattr(calm, name))
 
 
+@_fault
 def line(
     sim: AutopilotSim,
     *,
@@ -156,19 +176,16 @@ def line(
     corrupt: float = 0.0,
 ) -> None:
     """Make the line bad in both directions; each is a probability per datagram, 0 to 1."""
-    for name, value in (
-        ('drop', drop),
-        ('duplicate', duplicate),
-        ('reorder', reorder),
-        ('corrupt', corrupt),
-    ):
+    shares = {'drop': drop, 'duplicate': duplicate, 'reorder': reorder, 'corrupt': corrupt}
+    for name, value in shares.items():
         if not 0.0 <= value <= 1.0:
             raise VehicleError(f'fault line: {name} = {value} must lie between 0 and 1')
         setattr(sim.disturbance, name, float(value))
 
 
+@_fault
 def reboot(sim: AutopilotSim, *, in_the_air: bool = True) -> None:
-    """Restart the autopilot: boot time, intervals, mode and arming begin anew.
+    """Restart the autopilot: boot time, intervals, mode and arming are reset.
 
     Args:
         sim: The simulation.
@@ -178,11 +195,13 @@ def reboot(sim: AutopilotSim, *, in_the_air: bool = True) -> None:
     sim.reboot(keep_armed=in_the_air)
 
 
+@_fault
 def boot_clock(sim: AutopilotSim, *, step_s: float) -> None:
     """Let the autopilot's own clock (time_boot_ms, TIMESYNC) step without a reboot."""
     sim.disturbance.clock_step_s += float(step_s)
 
 
+@_fault
 def refuse(
     sim: AutopilotSim, *, modes: tuple[str, ...] | list[str], silently: bool = False
 ) -> None:
@@ -197,21 +216,25 @@ def refuse(
     sim.disturbance.refuse_silently = bool(silently)
 
 
+@_fault
 def pilot_mode(sim: AutopilotSim, *, mode: str) -> Answer:
     """Move the pilot's mode switch; answers ``accepted``."""
     return {'accepted': sim.pilot_mode(mode)}
 
 
+@_fault
 def yaw_stick(sim: AutopilotSim, *, deg_s: float) -> None:
     """Hold the pilot's yaw stick; 0 lets go."""
     sim.pilot_yaw_stick(radians(deg_s))
 
 
+@_fault
 def radio_loss(sim: AutopilotSim) -> None:
     """Lose the pilot's radio: RTL."""
     sim.lose_radio()
 
 
+@_fault
 def wind(
     sim: AutopilotSim,
     *,
@@ -223,6 +246,7 @@ def wind(
     sim.flight.physics.set_wind((float(to_north_m_s), float(to_east_m_s)), float(gust_m_s))
 
 
+@_fault
 def battery(sim: AutopilotSim, *, remaining: float) -> None:
     """Set the charge, 0 to 1; below 0.2 a STATUSTEXT warns once."""
     if not 0.0 <= remaining <= 1.0:
@@ -230,16 +254,19 @@ def battery(sim: AutopilotSim, *, remaining: float) -> None:
     sim.flight.set_battery(float(remaining))
 
 
+@_fault
 def text(sim: AutopilotSim, *, text: str, severity: int = 4) -> None:
     """Say a STATUSTEXT; severity is MAV_SEVERITY."""
     sim.flight.say(int(severity), str(text))
 
 
+@_fault
 def disarm(sim: AutopilotSim) -> None:
     """Stop the motors wherever the vehicle is."""
     sim.flight.disarm(force=True)
 
 
+@_fault
 def state(sim: AutopilotSim) -> Answer:
     """Return where the vehicle truly is and what it does; changes nothing."""
     flight = sim.flight
@@ -266,36 +293,6 @@ def state(sim: AutopilotSim) -> Answer:
         'lowest_agl_m': None if isinf(sim.lowest_agl_m) else sim.lowest_agl_m,
         'battery_remaining': flight.battery_remaining,
     }
-
-
-FAULTS: dict[str, Callable[..., Answer | None]] = {
-    each.__name__: each
-    for each in (
-        altitude,
-        battery,
-        boot_clock,
-        clear,
-        disarm,
-        frame,
-        gps_loss,
-        gps_restore,
-        line,
-        mend,
-        pilot_mode,
-        position,
-        radio_loss,
-        reboot,
-        refuse,
-        silence,
-        state,
-        telemetry_resume,
-        telemetry_stop,
-        text,
-        wind,
-        yaw_stick,
-    )
-}
-"""Name -> function; its keyword arguments are those of :func:`inject`."""
 
 
 def _one_of(name: str, value: str, choices: tuple[str, ...]) -> None:

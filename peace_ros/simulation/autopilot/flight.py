@@ -76,7 +76,7 @@ class Flight:
 
     @property
     def position_m(self) -> tuple[float, float, float]:
-        """North, east, down as the filter believes them."""
+        """North, east, down as the filter estimates them."""
         if self.estimator.stale_position and not self.has_position:
             return self._last_position_m
         offset = self.estimator.offset_m

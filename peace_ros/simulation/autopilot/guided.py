@@ -47,7 +47,7 @@ STOP = GuidedVelocity(0.0, 0.0, 0.0, None, 0.0)
 
 
 def understand(target: PositionTarget, heading_rad: float) -> GuidedVelocity | None:
-    """Return what the vehicle will do; STOP for what it rejects; None for numbers that are none.
+    """Return what the vehicle will do; STOP for what it rejects; None where a number is not finite.
 
     ArduCopter rejects an unknown frame or mask without an error message, and stops.
     """

@@ -94,7 +94,7 @@ class Personality:
         return PX4_NAMES.get(mode, mode.name) if self.is_px4 else mode.name
 
     def mode_of_name(self, name: str) -> Mode:
-        """Return the mode of its own name; KeyError for none such."""
+        """Return the mode of its own name; KeyError where the name is unknown."""
         if not self.is_px4:
             return Mode[name]
         return {own: mode for mode, own in PX4_NAMES.items()}[name]

@@ -13,11 +13,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from peace_ros.simulation.autopilot.commands import Params, run_command, run_message
 from peace_ros.simulation.autopilot.disturbance import BadLine, Disturbance
 from peace_ros.simulation.autopilot.flight import Flight
-from peace_ros.simulation.autopilot.lines import Lines
+from peace_ros.simulation.autopilot.lines import Address, Lines
 from peace_ros.simulation.autopilot.modes import Mode, Result, Severity
 from peace_ros.simulation.autopilot.parameters import AutopilotParameters
 from peace_ros.simulation.autopilot.personality import Personality
-from peace_ros.simulation.autopilot.serial_ports import Address
 from peace_ros.simulation.autopilot.signing import Signing
 from peace_ros.simulation.autopilot.streams import Streams
 
@@ -73,7 +72,6 @@ class MavlinkServer:
         self._seen = (0, 0)
         self._heartbeat_due_s = 0.0
         self._timesync_due_s = TIMESYNC_S
-        self.rejected_bytes = 0
         self._lines = Lines(
             parameters.host, parameters.port, parameters.tcp_port, parameters.serial_port
         )
@@ -85,7 +83,7 @@ class MavlinkServer:
 
     @property
     def waits_for_client(self) -> bool:
-        """The autopilot does not boot before somebody is there."""
+        """The autopilot boots when the first client has come."""
         return self._lines.waits_for_client
 
     @property
@@ -110,7 +108,7 @@ class MavlinkServer:
         self._lines.wait(seconds)
 
     def receive(self, flight: Flight) -> None:
-        """Take what has arrived; what is not MAVLink is counted and forgotten."""
+        """Take what has arrived; what is not MAVLink is dropped."""
         for address, data, whole in self._lines.hear():
             if self._disturbance.silent:
                 continue
@@ -155,12 +153,8 @@ class MavlinkServer:
         try:
             messages = self._signing.parse(parser, data)
         except mavlink.MAVError:
-            self.rejected_bytes += len(data)
             return []
-        good = [m for m in messages if m.get_msgId() >= 0]
-        if len(good) != len(messages) or (whole and not good):
-            self.rejected_bytes += len(data)
-        return good
+        return [m for m in messages if m.get_msgId() >= 0]
 
     def _peer(self, address: Address) -> GroundStation:
         peer = self._peers.get(address)
@@ -310,6 +304,5 @@ class MavlinkServer:
 
     def _tell_bytes(self, peer: GroundStation, data: bytes) -> None:
         for leaving in peer.outward.carry(data):
-            if not self._lines.tell(peer.address, leaving):
-                # A full buffer loses a datagram; a TCP line that stalls is closed.
-                self.rejected_bytes += len(leaving)
+            # A full buffer loses a datagram; a TCP line that stalls is closed.
+            self._lines.tell(peer.address, leaving)

@@ -45,7 +45,7 @@ class Signing:
             self._state.timestamp = max(self._state.timestamp, now)
 
     def codec(self, system_id: int = 0, component_id: int = 0) -> Any:
-        """Return a codec that goes on through damaged bytes."""
+        """Return a codec that skips damaged bytes."""
         codec = mavlink.MAVLink(None, system_id, component_id)
         codec.robust_parsing = True
         if self._state is not None:
@@ -53,18 +53,18 @@ class Signing:
         return codec
 
     def parse(self, codec: Any, data: bytes) -> list[Any]:
-        """Return the messages in some bytes, those that are none included (negative id)."""
+        """Return the messages in some bytes, unreadable ones included (negative id)."""
         if self._state is None:
             return list(codec.parse_buffer(bytearray(data)) or [])
         state = self._state
-        heard, believed = dict(state.stream_timestamps), state.goodsig_count
+        heard, accepted = dict(state.stream_timestamps), state.goodsig_count
         refused_before = state.reject_count
         try:
             return list(codec.parse_buffer(bytearray(data)) or [])
         finally:
             refused = state.reject_count - refused_before
             self.refused += refused
-            if refused and state.goodsig_count == believed:
+            if refused and state.goodsig_count == accepted:
                 # pymavlink takes over the time of a forged message before it looks at the rest.
                 state.stream_timestamps = heard
 

@@ -102,7 +102,7 @@ class Steering:
     def command(
         self, dt_s: float, mode: Mode, *, armed: bool, landed: bool, has_position: bool
     ) -> VelocityCommand:
-        """Return what the physics shall do in this step."""
+        """Return what the mode asks of the physics in this step."""
         self._velocity_age_s += dt_s
         self._attitude_age_s += dt_s
         if not armed:

@@ -152,7 +152,7 @@ class Streams:
         known = flight.estimator.reports_position(flight.time_s)
         if not known and self._personality.is_px4:
             return None
-        # ArduPilot goes on with the last place, and with the barometer's altitude.
+        # ArduPilot continues with the last place, and with the barometer's altitude.
         at_m = flight.position_m if known else flight.last_place_m
         (north, east, down), (v_north, v_east, v_down) = self._reported(flight, at_m)
         if not isfinite(down):

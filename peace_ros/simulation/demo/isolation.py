@@ -14,7 +14,7 @@ from peace_ros.core.resources import config_dir
 
 PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 _DOMAINS = range(60, 101)
-"""Above 101 the ports of a domain reach into those that Linux gives away by itself."""
+"""Above 101 the ports of a domain overlap with the ephemeral ports of Linux."""
 
 
 def isolate(log_dir: Path) -> int:
@@ -63,7 +63,7 @@ def _is_free(port: int) -> bool:
 
 
 def free_udp_port() -> int:
-    """Return a UDP port of the loopback interface that nobody holds."""
+    """Return a UDP port of the loopback interface that is free."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(('127.0.0.1', 0))
         return int(probe.getsockname()[1])

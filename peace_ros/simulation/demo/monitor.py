@@ -6,24 +6,18 @@ from __future__ import annotations
 
 import struct
 import threading
-import time
 from collections import Counter, OrderedDict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
-from std_srvs.srv import Trigger
 
-from peace_ros.core.domain import Frame, PeaceError, Pose, VehicleError
+from peace_ros.core.domain import Frame, PeaceError, Pose
 from peace_ros.nodes import qos
 from peace_ros.nodes.messages import (
     diagnostic_values,
@@ -34,6 +28,7 @@ from peace_ros.nodes.messages import (
 )
 from peace_ros.recording.messages import jpeg_image
 from peace_ros.simulation.demo.history import History, Status
+from peace_ros.simulation.demo.listener import Listener
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,7 +39,6 @@ IMAGE, PROMPT, HEATMAP = '/image', '/prompt', '/heatmap'
 STATUS, POSE = '/landing/status', '/ground_truth/pose'
 CAMERA_POSE = '/pose'
 """What the camera follows when it is not the ground truth of our own autopilot."""
-ENGAGE = '/landing/engage'
 IMAGE_IN_BAG = '/image/compressed'
 _KEPT_FRAMES = 40
 """Frames whose heatmap may still come."""
@@ -73,7 +67,7 @@ _RECORDED = (
 )
 
 
-class Monitor:
+class Monitor(Listener):
     """Spins in a thread of its own; everything it knows is read under :attr:`lock`."""
 
     def __init__(self, writer: BagWriter, *, use_sim_time: bool) -> None:
@@ -83,72 +77,31 @@ class Monitor:
         """Topic -> messages heard."""
         self._writer = writer
         self._last_bag_ns = 0
-        self._failure: Exception | None = None
-        rclpy.init(args=[], signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
-        self._node = Node(
-            'demo_monitor', parameter_overrides=[Parameter('use_sim_time', value=use_sim_time)]
-        )
+        super().__init__('demo_monitor', use_sim_time=use_sim_time)
         for topic in _RECORDED:
             writer.add_topic(topic.name, topic.type_name)
             self._subscribe(topic)
         writer.add_topic(IMAGE_IN_BAG, 'sensor_msgs/msg/CompressedImage')
         self._waiting: OrderedDict[int, bytes] = OrderedDict()
-        self._node.create_subscription(
+        self.node.create_subscription(
             Image, IMAGE, self._guarded(self._on_image), qos.IMAGE_IN, raw=True
         )
-        self._engage = self._node.create_client(Trigger, ENGAGE)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._thread = threading.Thread(target=self._spin, name='monitor', daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Stop listening; the bag may be closed after this."""
-        self._executor.shutdown()
-        rclpy.try_shutdown()
-        self._thread.join(timeout=5.0)
-
-    def check(self) -> None:
-        """Raise what went wrong in the thread, if anything did."""
-        if self._failure is not None:
-            raise self._failure
+        self.start()
 
     def clock_ns(self) -> int:
         """Return the node clock."""
-        return int(self._node.get_clock().now().nanoseconds)
+        return int(self.node.get_clock().now().nanoseconds)
 
     def heard(self, topic: str) -> int:
         """Return how many messages came on a topic."""
         with self.lock:
             return self.counts[topic]
 
-    def engage(self, limit_s: float = 10.0) -> None:
-        """Ask the landing node to take over.
-
-        Raises:
-            VehicleError: it does not answer in time, or refuses; then with its sentence.
-
-        """
-        if not self._engage.wait_for_service(timeout_sec=limit_s):
-            raise VehicleError(f'service {ENGAGE} did not appear within {limit_s:g} s: see the log')
-        future = self._engage.call_async(Trigger.Request())
-        deadline = time.monotonic() + limit_s
-        while not future.done():
-            if time.monotonic() > deadline:
-                raise VehicleError(f'service {ENGAGE} did not answer within {limit_s:g} s')
-            time.sleep(0.01)
-        answer = future.result()
-        if answer is None or not answer.success:
-            reason = answer.message if answer is not None else 'no answer'
-            raise VehicleError(f'the landing node refuses to engage: {reason}')
+    def engage(self, limit_s: float) -> None:
+        """Ask the landing node to take over, and note when it did."""
+        super().engage(limit_s)
         with self.lock:
             self.history.engaged_ns = self.clock_ns()
-
-    def _spin(self) -> None:
-        try:
-            self._executor.spin()
-        except ExternalShutdownException:
-            return
 
     def _subscribe(self, topic: _Topic) -> None:
         handle = {
@@ -167,7 +120,7 @@ class Monitor:
                 if handle is not None:
                     handle(message)
 
-        self._node.create_subscription(
+        self.node.create_subscription(
             topic.message, topic.name, self._guarded(store), topic.profile, raw=True
         )
 
@@ -178,7 +131,7 @@ class Monitor:
             try:
                 callback(message)
             except PeaceError as error:
-                self._failure = self._failure or error
+                self.failure = self.failure or error
 
         return call
 
@@ -225,7 +178,7 @@ class Monitor:
             self._add_reported_pose(status)
 
     def _add_reported_pose(self, status: Status) -> None:
-        """Take the autopilot's own word for the pose, where nobody publishes a better one."""
+        """Use the pose that the autopilot reports, where no better one is published."""
         north_m, east_m = status.number('north_m'), status.number('east_m')
         altitude_m = status.number('altitude_agl_m')
         if north_m is not None and east_m is not None and altitude_m is not None:

@@ -63,12 +63,12 @@ def node_arguments(wiring: Wiring) -> Arguments:
             'speed': float(wiring.speed),
             'publish_clock': wiring.use_sim_time,
         }
-        arguments['autopilot_sim'] = _ros_arguments(autopilot)
+        arguments['autopilot_sim'] = ros_arguments(autopilot)
     camera = {'camera_width': wiring.camera_px, 'camera_height': wiring.camera_px}
-    arguments['satellite_view'] = _ros_arguments({**clock, **camera, **_view(wiring)})
-    arguments['prompt_generator'] = _ros_arguments(clock, wiring.preset)
-    arguments['segmentation'] = _ros_arguments(clock, wiring.preset)
-    arguments['landing'] = _ros_arguments(
+    arguments['satellite_view'] = ros_arguments({**clock, **camera, **_view(wiring)})
+    arguments['prompt_generator'] = ros_arguments(clock, wiring.preset)
+    arguments['segmentation'] = ros_arguments(clock, wiring.preset)
+    arguments['landing'] = ros_arguments(
         {**clock, **camera, 'mavlink': wiring.mavlink}, wiring.preset
     )
     return arguments
@@ -89,12 +89,19 @@ def _view(wiring: Wiring) -> dict[str, object]:
     return view
 
 
-def _ros_arguments(parameters: Mapping[str, object], preset: Path | None = None) -> list[str]:
+def ros_arguments(
+    parameters: Mapping[str, object],
+    preset: Path | None = None,
+    remaps: Mapping[str, str] | None = None,
+) -> list[str]:
+    """Return the command line of a node: parameters, parameter file, topic -> other topic."""
     given = ['--ros-args']
     if preset is not None:
         given += ['--params-file', str(preset)]
     for name, value in parameters.items():
         given += ['-p', f'{name}:={_yaml(value)}']
+    for name, topic in (remaps or {}).items():
+        given += ['-r', f'{name}:={topic}']
     return given
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a person with a ground station would do: ready, arm, take off, land.
+"""What a person with a ground station would do: ready, arm, take off.
 
 Made for demonstrations and tests. Nothing here arms unless the caller says so:
 by :meth:`Pilot.arm`, or by ``arm=True`` of :meth:`Pilot.take_off`.
@@ -103,29 +103,8 @@ class Pilot:
             deadline - time.monotonic(),
         )
 
-    def land(self, timeout_s: float = 120.0) -> None:
-        """LAND, and wait until the motors are off."""
-        deadline = time.monotonic() + timeout_s
-        self.set_mode(self._link.dialect.land_mode, timeout_s)
-        self.wait_disarmed(deadline - time.monotonic())
-
-    def wait_disarmed(self, timeout_s: float = 120.0) -> None:
-        """Wait until the autopilot has stopped its motors."""
-        self._wait(lambda: not self._link.telemetry().armed, 'motors off', timeout_s)
-
-    def wait_altitude(
-        self, altitude_m: float, tolerance_m: float = 1.0, timeout_s: float = 120.0
-    ) -> None:
-        """Wait until the vehicle is within a tolerance of an altitude above ground."""
-
-        def there() -> bool:
-            pose = self._link.telemetry().pose
-            return pose is not None and abs(pose.altitude_agl_m - altitude_m) <= tolerance_m
-
-        self._wait(there, f'{altitude_m} m above ground', timeout_s)
-
     def _prepare_take_off(self, altitude_m: float, timeout_s: float) -> float:
-        """Make ready; return the altitude to ask for, whose reference differs."""
+        """Make ready; return the altitude to ask for (PX4 counts it from sea level)."""
         if self._link.dialect.name != 'px4':
             self.set_mode(self._link.dialect.control_mode, timeout_s)
             return altitude_m
@@ -140,7 +119,7 @@ class Pilot:
             raise VehicleError(f'disarmed during the take-off: {told.status_text}')
         self._say(f'{told.mode}: {5 * round(told.pose.altitude_agl_m / 5)} m of {altitude_m:.0f} m')
         high = told.pose.altitude_agl_m >= 0.9 * altitude_m
-        # An autopilot that tells no landed state is believed by altitude alone.
+        # Without a landed state the altitude alone decides.
         return high and self._link.landed_state in {
             mavlink.MAV_LANDED_STATE_UNDEFINED,
             mavlink.MAV_LANDED_STATE_IN_AIR,
@@ -182,4 +161,4 @@ class Pilot:
 
 
 def _quiet(_text: str) -> None:
-    """Take progress that nobody asked for."""
+    """Ignore progress."""

@@ -14,7 +14,6 @@ from peace_ros.simulation.demo.pilot import Pilot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import TracebackType
 
     from typing_extensions import Self
 
@@ -35,12 +34,7 @@ class VehicleLine:
         """Return itself, not opened yet."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Release the line."""
         self._left = True
         if self._link is not None:

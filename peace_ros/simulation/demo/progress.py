@@ -16,7 +16,6 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import TracebackType
 
     from rich.console import Console
     from typing_extensions import Self
@@ -86,12 +85,7 @@ class Progress:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        error_type: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Show the last snapshot and stop."""
         self._stop.set()
         self._thread.join(timeout=2.0)

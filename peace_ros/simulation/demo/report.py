@@ -32,7 +32,7 @@ _MOST_VISITS = 10
 _LEAST_STEP_NS = 100_000_000
 """Poses nearer to each other than this are not drawn."""
 _WHOLE_IMAGE = 0.75
-"""A focus of at least this part of the image's width is no focus."""
+"""A focus of at least this part of the image's width is the whole image, and not drawn."""
 
 
 def draw_pictures(

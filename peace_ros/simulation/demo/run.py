@@ -191,7 +191,7 @@ def _fly(run: _Run, monitor: Monitor, group: ProcessGroup) -> Ending:
     run.phase = 'engaging the landing node'
     status = monitor.heard(STATUS)
     _wait(run, monitor, group, lambda: monitor.heard(STATUS) > status, 'landing/status')
-    _beside(monitor, group, lambda: _engage(monitor))
+    _beside(monitor, group, lambda: monitor.engage(_ENGAGE_S))
     run.phase = 'flown by the landing node'
     return _follow(run, monitor, group)
 
@@ -214,25 +214,8 @@ def _measure_speed(run: _Run, monitor: Monitor, group: ProcessGroup) -> None:
         raise _TooSlow(heatmap_hz)
 
 
-def _engage(monitor: Monitor) -> None:
-    """Engage; right after the climb the map may still be waiting for its first heatmap."""
-    deadline = time.monotonic() + _ENGAGE_S
-    while not _is_engaged(monitor, is_last=time.monotonic() > deadline):
-        time.sleep(0.5)
-
-
-def _is_engaged(monitor: Monitor, *, is_last: bool) -> bool:
-    try:
-        monitor.engage()
-    except VehicleError:
-        if is_last:
-            raise
-        return False
-    return True
-
-
 def _follow(run: _Run, monitor: Monitor, group: ProcessGroup) -> Ending:
-    """Wait for the outcome of the landing node, or for the end of the patience."""
+    """Wait for the outcome of the landing node, but not longer than the limit."""
     deadline = time.monotonic() + run.options.timeout_s
     while time.monotonic() < deadline:
         group.check()

@@ -252,17 +252,10 @@ def industry(f: Furnisher, block: Block) -> None:
     size_y = inner.depth_m * (0.75 if along_x else share)
     style = ('flat_pale', 'flat_dark', 'metal', 'metal')[int(rng.integers(4))]
     roof = 'flat' if style.startswith('flat') else ('saw' if rng.random() < 0.3 else 'metal')
-    f.plan.building(
-        inner.x0 + size_x / 2,
-        inner.y1 - size_y / 2,
-        max(size_x, 6.0),
-        max(size_y, 6.0),
-        0.0,
-        float(rng.uniform(6.0, 11.0)),
-        roof,
-        f.palette.roof(style),
-        int(rng.integers(2**31)),
-    )
+    x, y = inner.x0 + size_x / 2, inner.y1 - size_y / 2
+    eaves, rgb = float(rng.uniform(6.0, 11.0)), f.palette.roof(style)
+    seed = int(rng.integers(2**31))
+    f.plan.building(x, y, max(size_x, 6.0), max(size_y, 6.0), 0.0, eaves, roof, rgb, seed)
     yard = (
         Block(inner.x0 + size_x + 3, inner.y0, inner.x1, inner.y1)
         if along_x
@@ -301,19 +294,10 @@ def farmyard(f: Furnisher, block: Block) -> None:
     yard = block.inset(min(8.0, 0.2 * block.width_m))
     f.fill(yard, ('gravel', 'track', 'concrete', 'soil')[int(rng.integers(4))])
     for k in range(int(rng.integers(2, 5))):
-        x, y = f.point(yard)
+        at = f.point(yard)
         style = ('tiles', 'metal', 'tiles', 'flat_dark')[int(rng.integers(4))]
-        f.plan.building(
-            x,
-            y,
-            float(rng.uniform(14, 34)),
-            float(rng.uniform(8, 14)),
-            pi / 2 * (k % 2),
-            float(rng.uniform(3.5, 6)),
-            'gable' if style == 'tiles' else 'metal',
-            f.palette.roof(style),
-            int(rng.integers(2**31)),
-        )
+        roof = 'gable' if style == 'tiles' else 'metal'
+        f.hall(at, (14, 34), (8, 14), (3.5, 6), roof, style, pi / 2 * (k % 2))
     for _ in range(int(rng.poisson(3))):
         f.vehicle(*f.point(yard), rng.uniform(0, pi), 'truck' if rng.random() < 0.4 else None)
     for _ in range(int(rng.poisson(6))):

@@ -14,7 +14,8 @@ from peace_ros.core.domain import Label, WorldError
 
 Image = NDArray[np.float32]
 Labels = NDArray[np.uint8]
-_Effect = Callable[[Image, np.random.Generator, float, 'Labels | None'], Image]
+Rng = np.random.Generator
+_Effect = Callable[[Image, Rng, float, 'Labels | None'], Image]
 
 _GREY = np.array([0.3, 0.59, 0.11], np.float32)
 
@@ -61,12 +62,11 @@ def _tint(image: Image, red: float, green: float, blue: float) -> Image:
     return np.asarray(image * np.array([red, green, blue], np.float32))
 
 
-def _clear(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del rng, force, labels
+def _clear(image: Image, _rng: np.random.Generator, _force: float, _labels: Labels | None) -> Image:
     return image
 
 
-def _snowy(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
+def _snowy(image: Image, rng: Rng, force: float, labels: Labels | None) -> Image:
     """Cover with snow what lies open; steep, warm, moving and wet things show through."""
     patch = 0.55 * _smooth(rng, image.shape, 6) + 0.35 * _smooth(rng, image.shape, 40)
     cover = np.clip(2.6 * force - 0.35 + 0.45 * patch, 0.0, 0.94)
@@ -84,7 +84,7 @@ def _snowy(image: Image, rng: np.random.Generator, force: float, labels: Labels 
     return np.asarray(_saturate(mixed, 0.8), np.float32)
 
 
-def _winter(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
+def _winter(image: Image, rng: Rng, force: float, labels: Labels | None) -> Image:
     if rng.random() < 0.5:
         return _snowy(image, rng, 0.35 + 0.5 * force, labels)
     pale = _tint(_saturate(image, 1.0 - 0.5 * force), 0.97, 0.98, 1.06)
@@ -96,7 +96,7 @@ def _greenness(image: Image) -> Image:
     return np.asarray(np.clip(excess / 40.0, 0.0, 1.0), np.float32)
 
 
-def _autumn(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
+def _autumn(image: Image, rng: Rng, force: float, labels: Labels | None) -> Image:
     green = _greenness(image)
     if labels is not None:
         green = np.maximum(green, 0.7 * (labels == Label.TREE).astype(np.float32))
@@ -110,35 +110,31 @@ def _autumn(image: Image, rng: np.random.Generator, force: float, labels: Labels
     return np.asarray(image + (leaves - image) * (green * force)[..., None], np.float32)
 
 
-def _spring(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del rng, labels
+def _spring(image: Image, _rng: Rng, force: float, _labels: Labels | None) -> Image:
     fresh = _tint(image, 0.95, 1.0 + 0.16 * force, 0.86) * np.float32(1.05)
     green = _greenness(image)[..., None]
     return np.asarray(image + (fresh - image) * (0.4 + 0.6 * green), np.float32)
 
 
-def _summer(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del rng, labels
+def _summer(image: Image, _rng: Rng, force: float, _labels: Labels | None) -> Image:
     warm = _tint(image, 1.0 + 0.10 * force, 1.0 + 0.03 * force, 1.0 - 0.08 * force)
     return np.asarray((warm - 110.0) * (1.0 + 0.15 * force) + 116.0, np.float32)
 
 
-def _fog(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del labels
+def _fog(image: Image, rng: Rng, force: float, _labels: Labels | None) -> Image:
     veil = np.clip(0.35 + 0.42 * force + 0.10 * _smooth(rng, image.shape, 3), 0.0, 0.9)[..., None]
     air = rng.uniform(176.0, 226.0) * np.array([0.99, 1.0, 1.02], np.float32)
     soft = cv2.GaussianBlur(image, (0, 0), 0.4 + 1.2 * force)
     return np.asarray(soft + (air - soft) * veil, np.float32)
 
 
-def _smog(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del labels
+def _smog(image: Image, rng: Rng, force: float, _labels: Labels | None) -> Image:
     veil = np.clip(0.28 + 0.36 * force + 0.07 * _smooth(rng, image.shape, 3), 0.0, 0.8)[..., None]
     air = rng.uniform(138.0, 182.0) * np.array([1.06, 0.99, 0.82], np.float32)
     return np.asarray(image + (air - image) * veil, np.float32)
 
 
-def _night(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
+def _night(image: Image, rng: Rng, force: float, labels: Labels | None) -> Image:
     dim = 0.36 - 0.22 * force
     dark = _tint(_saturate(image, 0.45), 0.82, 0.92, 1.2) * np.float32(dim)
     lamps = np.zeros(image.shape[:2], np.float32)
@@ -154,34 +150,30 @@ def _night(image: Image, rng: np.random.Generator, force: float, labels: Labels 
     return np.asarray(dark + grain, np.float32)
 
 
-def _dark(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del labels
+def _dark(image: Image, rng: Rng, force: float, _labels: Labels | None) -> Image:
     dim = np.float32(0.62 - 0.4 * force)
     grain = rng.standard_normal(image.shape, dtype=np.float32) * np.float32(2.0)
     return np.asarray(_saturate(image, 0.8) * dim + grain, np.float32)
 
 
-def _bright(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del rng, labels
+def _bright(image: Image, _rng: Rng, force: float, _labels: Labels | None) -> Image:
     lifted = 255.0 * (np.clip(image, 0, 255) / 255.0) ** (1 - 0.45 * force)
     return np.asarray(lifted + 12 * force, np.float32)
 
 
-def _sunny(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del rng, labels
+def _sunny(image: Image, _rng: Rng, force: float, _labels: Labels | None) -> Image:
     warm = _tint(_saturate(image, 1.0 + 0.25 * force), 1.0 + 0.08 * force, 1.03, 1 - 0.05 * force)
     return np.asarray((warm - 118.0) * (1.08 + 0.28 * force) + 128.0 + 6.0 * force, np.float32)
 
 
-def _cloudy(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del labels
+def _cloudy(image: Image, rng: Rng, force: float, _labels: Labels | None) -> Image:
     flat = (image - 110.0) * np.float32(1.0 - 0.35 * force) + 108.0
     cloud = 1.0 - 0.14 * force * np.clip(0.5 + _smooth(rng, image.shape, 2), 0.0, 1.5)
     cool = _tint(_saturate(flat, 1.0 - 0.35 * force), 0.96, 0.99, 1.05)
     return np.asarray(cool * cloud[..., None], np.float32)
 
 
-def _rainy(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
+def _rainy(image: Image, rng: Rng, force: float, labels: Labels | None) -> Image:
     wet = _damp(image, rng, force, labels)
     streaks = (rng.random(image.shape[:2], dtype=np.float32) > 0.988).astype(np.float32)
     length = max(5, image.shape[0] // 28)
@@ -194,7 +186,7 @@ def _rainy(image: Image, rng: np.random.Generator, force: float, labels: Labels 
     return np.asarray(veil + rain[..., None] * np.float32(26.0 * force), np.float32)
 
 
-def _damp(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
+def _damp(image: Image, rng: Rng, force: float, labels: Labels | None) -> Image:
     dull = _tint(_saturate(image, 1.0 - 0.15 * force), 0.94, 0.97, 1.02)
     wet = dull * np.float32(1.0 - 0.3 * force)
     sheen = np.clip(_smooth(rng, image.shape, 14) - 0.7, 0.0, 1.0)
@@ -203,33 +195,26 @@ def _damp(image: Image, rng: np.random.Generator, force: float, labels: Labels |
     return np.asarray(wet + sheen[..., None] * np.float32(42.0 * force), np.float32)
 
 
-def _evening(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del rng, labels
+def _evening(image: Image, _rng: Rng, force: float, _labels: Labels | None) -> Image:
     low = _tint(image, 1.0 + 0.20 * force, 0.98 - 0.06 * force, 0.92 - 0.28 * force)
     return np.asarray(low * np.float32(0.92 - 0.22 * force), np.float32)
 
 
-def _morning(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
+def _morning(image: Image, _rng: Rng, force: float, _labels: Labels | None) -> Image:
     mist = image + (np.float32(196.0) - image) * np.float32(0.14 * force)
-    del rng, labels
     return np.asarray(_tint(mist, 1.0 + 0.07 * force, 1.0, 1.0 - 0.02 * force) * 0.95, np.float32)
 
 
-def _afternoon(
-    image: Image, rng: np.random.Generator, force: float, labels: Labels | None
-) -> Image:
-    del rng, labels
+def _afternoon(image: Image, _rng: Rng, force: float, _labels: Labels | None) -> Image:
     return np.asarray(_tint(image, 1.0 + 0.09 * force, 1.02, 1.0 - 0.10 * force), np.float32)
 
 
-def _heat(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del rng, labels
+def _heat(image: Image, _rng: Rng, force: float, _labels: Labels | None) -> Image:
     pale = _tint(image, 1.0 + 0.14 * force, 1.02, 1.0 - 0.16 * force)
     return np.asarray(pale + (np.float32(214.0) - pale) * np.float32(0.14 * force), np.float32)
 
 
-def _blurred(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del labels
+def _blurred(image: Image, rng: Rng, force: float, _labels: Labels | None) -> Image:
     sigma = (0.9 + 2.6 * force) * image.shape[0] / 352.0
     if rng.random() < 0.6:
         return np.asarray(cv2.GaussianBlur(image, (0, 0), max(sigma, 0.6)), np.float32)
@@ -245,9 +230,8 @@ def _blurred(image: Image, rng: np.random.Generator, force: float, labels: Label
     return np.asarray(cv2.filter2D(image, -1, kernel / kernel.sum()), np.float32)
 
 
-def _rendered(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
+def _rendered(image: Image, rng: Rng, force: float, _labels: Labels | None) -> Image:
     """Flat shaded: detail smoothed within regions, few tones, clean edges."""
-    del labels
     smooth = np.clip(image, 0, 255).astype(np.uint8)
     for _ in range(1 + round(2 * force)):
         smooth = cv2.bilateralFilter(smooth, 5, 48.0, 2.5)
@@ -256,7 +240,7 @@ def _rendered(image: Image, rng: np.random.Generator, force: float, labels: Labe
     return np.asarray(_saturate(flat, 1.1 + 0.25 * float(rng.random())), np.float32)
 
 
-def _three_d(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
+def _three_d(image: Image, rng: Rng, force: float, labels: Labels | None) -> Image:
     """Embossed: edges lit from one side, as in a computer-made relief."""
     flat = _rendered(image, rng, 0.35 * force, labels)
     grey = cv2.GaussianBlur(flat @ _GREY, (0, 0), 1.0)
@@ -265,8 +249,7 @@ def _three_d(image: Image, rng: np.random.Generator, force: float, labels: Label
     return np.asarray(flat + lit[..., None], np.float32)
 
 
-def _noise(image: Image, rng: np.random.Generator, force: float, labels: Labels | None) -> Image:
-    del labels
+def _noise(image: Image, rng: Rng, force: float, _labels: Labels | None) -> Image:
     sigma = np.float32(7.0 + 22.0 * force)
     return np.asarray(image + rng.standard_normal(image.shape, dtype=np.float32) * sigma)
 

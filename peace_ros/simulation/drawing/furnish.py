@@ -10,7 +10,7 @@ from math import cos, pi, sin
 import numpy as np
 
 from peace_ros.core.domain import Label
-from peace_ros.simulation.drawing.palette import Material, Palette, jitter
+from peace_ros.simulation.drawing.palette import Material, Palette, Rgb, jitter
 from peace_ros.simulation.drawing.plan import Plan
 from peace_ros.simulation.drawing.sprites import label_of
 
@@ -147,7 +147,7 @@ class Furnisher:
         self.plan.thing(name, x, y, heading, float(length), float(width), rgb, Label.VEHICLE)
 
     def person(self, x: float, y: float) -> None:
-        """Let somebody stand or walk."""
+        """Put a person who stands or walks."""
         rng = self.rng
         sprite = 'person' if rng.random() < 0.5 else 'walker'
         size = float(rng.uniform(0.48, 0.6))
@@ -236,20 +236,30 @@ class Furnisher:
             )
         plan.building(x, y, length_m, width_m, heading_rad, eaves, roof, rgb, seed)
 
+    def hall(
+        self,
+        at: tuple[float, float],
+        length_m: tuple[float, float],
+        width_m: tuple[float, float],
+        eaves_m: tuple[float, float],
+        roof: str = 'flat',
+        style: str = 'flat_pale',
+        heading_rad: float = 0.0,
+        rgb: Rgb | None = None,
+    ) -> None:
+        """Build a body whose sizes lie within bounds, in a colour or one of a style."""
+        length, width, eaves = (
+            float(self.rng.uniform(*each)) for each in (length_m, width_m, eaves_m)
+        )
+        rgb = self.palette.roof(style) if rgb is None else rgb
+        seed = int(self.rng.integers(2**31))
+        self.plan.building(*at, length, width, heading_rad, eaves, roof, rgb, seed)
+
     def shed(self, x: float, y: float, heading_rad: float) -> None:
         """Build a garden shed or garage."""
         rng = self.rng
         style = ('tiles', 'flat_dark', 'metal', 'flat_pale')[int(rng.integers(4))]
         roof = 'gable' if style == 'tiles' else 'plain'
         length, width = float(rng.uniform(2.2, 6.0)), float(rng.uniform(1.8, 3.2))
-        self.plan.building(
-            x,
-            y,
-            length,
-            width,
-            heading_rad,
-            2.2,
-            roof,
-            self.palette.roof(style),
-            int(rng.integers(2**31)),
-        )
+        rgb, seed = self.palette.roof(style), int(rng.integers(2**31))
+        self.plan.building(x, y, length, width, heading_rad, 2.2, roof, rgb, seed)

@@ -237,18 +237,8 @@ def works(f: Furnisher, block: Block) -> None:
     if rng.random() < 0.25:
         f.blob(*f.point(block), float(rng.uniform(1.5, 4)), f.material('pond'), 0.35, block)
     if rng.random() < 0.5 and min(block.width_m, block.depth_m) > 30:
-        x, y = f.point(block.inset(12.0))
-        f.plan.building(
-            x,
-            y,
-            float(rng.uniform(10, 22)),
-            float(rng.uniform(8, 14)),
-            0.0,
-            float(rng.uniform(2, 9)),
-            'flat',
-            (176.0, 172.0, 164.0),
-            int(rng.integers(2**31)),
-        )
+        shell = (176.0, 172.0, 164.0)
+        f.hall(f.point(block.inset(12.0)), (10, 22), (8, 14), (2, 9), rgb=shell)
     for _ in range(int(rng.poisson(2.5))):
         f.vehicle(*f.point(block), rng.uniform(0, pi), 'digger' if rng.random() < 0.6 else 'truck')
     for _ in range(int(rng.poisson(2.0))):
@@ -279,18 +269,7 @@ def desert(f: Furnisher, block: Block) -> None:
         rgb = jitter(rng, (106, 100, 68), 0.2, 0.06)
         f.plan.tree(x, y, diameter, 0.6 * diameter, rgb, 'leafy')
     for _ in range(int(rng.poisson(1.3))):
-        x, y = f.point(block.inset(8.0))
-        f.plan.building(
-            x,
-            y,
-            float(rng.uniform(8, 18)),
-            float(rng.uniform(7, 13)),
-            0.0,
-            float(rng.uniform(3, 8)),
-            'flat',
-            f.palette.roof('flat_pale'),
-            int(rng.integers(2**31)),
-        )
+        f.hall(f.point(block.inset(8.0)), (8, 18), (7, 13), (3, 8))
     for _ in range(int(rng.poisson(1.5))):
         f.vehicle(*f.point(block), rng.uniform(0, pi))
     f.people(block, 22.0)

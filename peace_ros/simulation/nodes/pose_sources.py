@@ -30,7 +30,7 @@ _POLL_S = 0.02
 _INTEGRATION_HZ = 50.0
 _TRY_S = 3.0
 _CAMERA_SYSTEM_ID = 254
-"""Not that of the companion, whose connection to the same autopilot is another one."""
+"""Differs from that of the companion, which has its own connection to the same autopilot."""
 
 Sink = Callable[[Pose], None]
 
@@ -73,7 +73,7 @@ class MavlinkSource:
         link = self._connection.link
         for pose in () if link is None else link.take_poses():
             if not pose.has_position:
-                continue  # over which ground the vehicle is, nobody knows then
+                continue  # it is not known over which ground the vehicle is
             # On the topic the ground is at z = 0, wherever the autopilot has its origin.
             self._output.publish(replace(pose, down_m=-pose.altitude_agl_m))
             self._sink(pose)

@@ -11,7 +11,7 @@ from peace_ros.core.domain.geometry import quaternion_from_euler
 
 
 class TwistVehicle:
-    """Level attitude, heading turned by yaw rate only; it stops when nobody speaks to it."""
+    """Level attitude, heading turned by yaw rate only; it stops when no command comes."""
 
     def __init__(self, altitude_m: float, timeout_s: float) -> None:
         self._north_m = self._east_m = 0.0

@@ -200,7 +200,7 @@ def test_the_description_says_every_limit(stopping: Fault) -> None:
 
 def test_a_person_below_is_not_descended_upon_for_long(stopping: Fault, record: Record) -> None:
     fault = with_expected(stopping, over_person_s=1.5)
-    assert any('nobody walked below' in each for each in judge(fault, record).failures)
+    assert any('no person walked below' in each for each in judge(fault, record).failures)
     record.over_person_s = 1.2
     row = judge(fault, record)
     assert row.passed

@@ -86,26 +86,15 @@ def test_survives_a_reboot_and_a_silence(eventually):
         link.close()
 
 
-def test_flies_from_boot_to_landing_and_tells_what_it_waits_for():
+def test_takes_off_from_boot_and_tells_what_it_waits_for():
     said = []
     with AutopilotSim(AutopilotParameters(port=0, speed=20.0)) as sim:
         link = open_vehicle(sim.url)
-        pilot = Pilot(link, said.append, retry_s=0.1)
-        pilot.take_off(10.0, timeout_s=40.0, arm=True)
+        Pilot(link, said.append, retry_s=0.1).take_off(10.0, timeout_s=40.0, arm=True)
         assert sim.truth().altitude_agl_m == pytest.approx(10.0, abs=0.6)
-        pilot.land(20.0)
-        assert sim.truth().altitude_agl_m == 0.0
-        assert eventually_landed(link)
         link.close()
     assert any('GPS 1: Bad fix' in text for text in said), 'boot was waited out'
     assert 'armed' in said
-
-
-def eventually_landed(link):
-    deadline = time.monotonic() + 2.0
-    while link.telemetry().landed is not True and time.monotonic() < deadline:
-        time.sleep(0.01)
-    return link.telemetry().landed
 
 
 def test_take_off_does_not_arm_unless_told(eventually):
