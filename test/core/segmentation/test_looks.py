@@ -40,6 +40,12 @@ def test_a_frame_is_cut_as_finely_as_its_pixels_and_the_limit_allow(
         assert len({part.own_rows.start for part in parts}) == rows
 
 
+def test_the_sharper_direction_gives_up_a_part_whatever_the_input() -> None:
+    parts = parts_of((1600, 800), (400, 200), 13)  # of 4 x 4 as sharp either way
+    assert len({part.own_columns.start for part in parts}) == 3
+    assert len({part.own_rows.start for part in parts}) == 4
+
+
 @given(st.integers(1, 5000), st.integers(1, 5000), st.integers(1, 101))
 def test_parts_share_the_frame_among_them_and_none_is_enlarged(
     width: int, height: int, most: int
@@ -89,6 +95,55 @@ def test_what_parts_answer_lies_where_they_lie() -> None:
         for column in range(16):
             block = found[row * cell_px :, column * cell_px :][middle, middle]
             assert block.mean() == pytest.approx(cells[row, column], abs=0.08)
+
+
+def test_a_part_sees_a_twentieth_more_on_each_side_within_the_frame() -> None:
+    parts = parts_of((800, 400), (200, 200), 50)
+    assert len(parts) == 8
+    second = parts[1]
+    assert (second.rows, second.columns) == (slice(0, 210), slice(190, 410))
+    assert (second.own_rows, second.own_columns) == (slice(0, 200), slice(200, 400))
+    last = parts[7]
+    assert (last.rows, last.columns) == (slice(190, 400), slice(590, 800))
+
+
+def test_a_part_is_cut_out_contiguously() -> None:
+    image = np.arange(400 * 800 * 3, dtype=np.uint32).astype(np.uint8).reshape(400, 800, 3)
+    part = parts_of((800, 400), (200, 200), 50)[6]
+    seen = part.of(image)
+    assert seen.flags.c_contiguous
+    assert np.array_equal(seen, image[190:400, 390:610])
+
+
+@pytest.mark.parametrize('axis', [0, 1])
+def test_a_ramp_over_the_frame_stays_a_ramp_over_the_parts(axis: int) -> None:
+    """To a thirtieth of a cell, in which OpenCV counts."""
+    length, cells = (800, 400)[axis], 4
+
+    def ramp(start: float, stop: float, count: int) -> np.ndarray:
+        centres = start + (np.arange(count) + 0.5) / count * (stop - start)
+        line = (0.2 + 0.6 * centres / length).astype(np.float32)
+        square = np.tile(line, (count, 1))
+        return square if axis == 0 else np.ascontiguousarray(square.T)
+
+    parts = parts_of((800, 400), (200, 200), 50)
+    seen = [(part.columns, part.rows)[axis] for part in parts]
+    answers = [ramp(each.start, each.stop, cells) for each in seen]
+    found = joined(ramp(0, length, cells), answers, parts).astype(float)
+    assert found.shape == (2 * cells, 4 * cells)
+    count = found.shape[1 - axis]
+    without_caution = 1 / (1 + np.exp(-np.log(found / (1 - found)) - 0.15))
+    got = without_caution if axis == 0 else without_caution.T
+    expected = 0.2 + 0.6 * (np.arange(count) + 0.5) / count
+    inside = slice(3, -3)  # where the whole frame's own answer is a ramp too
+    assert np.allclose(got[:, inside], expected[inside], atol=0.003)
+
+
+def test_each_part_needs_an_answer() -> None:
+    parts = parts_of((704, 704), INPUT, 10)
+    whole = np.full((4, 4), 0.5, np.float32)
+    with pytest.raises(ValueError, match='zip'):
+        joined(whole, [whole] * 3, parts)
 
 
 def test_a_person_seen_closely_outweighs_a_whole_that_shows_lawn() -> None:
