@@ -14,6 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from peace_ros.core.domain import PeaceError
 from peace_ros.core.inference import Bundle, ClipEncoder
+from peace_ros.core.node_parameters import PromptGeneratorOptions, groups_of
 from peace_ros.core.prompting import (
     PromptGenerator,
     PromptingParameters,
@@ -29,13 +30,9 @@ from peace_ros.nodes.messages import (
     frame_from_message,
     prompt_to_message,
 )
-from peace_ros.nodes.options import PromptGeneratorOptions
-from peace_ros.nodes.parameters import Group
 from peace_ros.nodes.qos import RESULT
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.worker import NewestWorker
-
-PARAMETERS: tuple[Group, ...] = (('', PromptingParameters), ('', PromptGeneratorOptions))
 
 
 def create_generator(
@@ -75,7 +72,7 @@ class PromptGeneratorNode(PeaceNode):
             PeaceError: parameters, vocabularies or bundle cannot be used.
 
         """
-        super().__init__('prompt_generator', *PARAMETERS, **options)
+        super().__init__('prompt_generator', *groups_of('prompt_generator'), **options)
         parameters = self.filled(PromptingParameters)
         self._generator = generator or create_generator(parameters, self.get_logger().info)
         self._last_template = ''

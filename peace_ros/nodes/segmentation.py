@@ -13,6 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CompressedImage, Image
 
 from peace_ros.core.domain import Frame, Heatmap, PeaceError, Prompt
+from peace_ros.core.node_parameters import SegmentationOptions, groups_of
 from peace_ros.core.prompting import categories_of, resolve_template
 from peace_ros.core.segmentation import (
     CameraWatch,
@@ -34,14 +35,11 @@ from peace_ros.nodes.messages import (
     prompt_from_message,
     stamp_ns,
 )
-from peace_ros.nodes.options import SegmentationOptions
-from peace_ros.nodes.parameters import Group
 from peace_ros.nodes.prompts import PromptBoard
 from peace_ros.nodes.qos import IMAGE_OUT, RESULT
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.worker import NewestWorker
 
-PARAMETERS: tuple[Group, ...] = (('', SegmentationParameters), ('', SegmentationOptions))
 _NAME = 'segmentation'
 _SLOW_S = 1.0
 """Work for one frame that leaves little of the age that the landing allows a heatmap."""
@@ -61,7 +59,7 @@ class SegmentationNode(PeaceNode):
             PeaceError: parameters, terms or bundle cannot be used.
 
         """
-        super().__init__(_NAME, *PARAMETERS, **options)
+        super().__init__(_NAME, *groups_of(_NAME), **options)
         self._options = self.filled(SegmentationOptions)
         template = resolve_template(self._options.template)
         self._static = None if categories_of(template) else Prompt(template, 0)

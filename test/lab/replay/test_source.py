@@ -10,10 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from peace_ros.core.domain import ConfigurationError, PeaceError, RecordingError
-from peace_ros.core.landing import LandingParameters
-from peace_ros.core.presets import load_preset, preset_names
-from peace_ros.core.prompting import PromptingParameters
+from peace_ros.core.domain import RecordingError
 from peace_ros.lab.replay import SourceOptions, open_source
 from peace_ros.recording import BagWriter, VideoWriter
 from peace_ros.recording.messages import diagnostic_array, jpeg_image, pose_stamped
@@ -122,35 +119,3 @@ def test_a_bad_source_is_one_sentence(tmp_path, name) -> None:
 def test_senseless_parts_are_refused(given) -> None:
     with pytest.raises(RecordingError, match='give'):
         SourceOptions(**given)
-
-
-def test_the_six_presets_are_there_and_fill_the_parameters() -> None:
-    assert preset_names() == ['d_cs', 'd_fs', 'dd_cs', 'dd_fs', 'peace_cs', 'peace_fs']
-    preset = load_preset('DD-CS')
-    assert preset.fill('prompt_generator', PromptingParameters).template == 'DD'
-    assert preset.fill('prompt_generator', PromptingParameters, threads=1).threads == 1
-    assert preset.fill('landing', LandingParameters) == LandingParameters()
-
-
-def test_a_preset_of_ones_own_is_read_and_checked(tmp_path) -> None:
-    path = tmp_path / 'mine.yaml'
-    path.write_text(
-        '/**:\n  ros__parameters:\n    threads: 1\n'
-        'landing:\n  ros__parameters:\n    safety_radius_m: 3\n'
-    )
-    preset = load_preset(str(path))
-    assert preset.fill('landing', LandingParameters).safety_radius_m == 3.0
-    assert preset.fill('prompt_generator', PromptingParameters).threads == 1
-    path.write_text('landing:\n  ros__parameters:\n    safety_radius_m: wide\n')
-    with pytest.raises(ConfigurationError, match="safety_radius_m = 'wide'"):
-        load_preset(str(path)).fill('landing', LandingParameters)
-
-
-@pytest.mark.parametrize('text', ['', '- 1\n', 'landing: 3\n', 'a: [\n'])
-def test_a_file_that_is_no_preset_is_refused(tmp_path, text) -> None:
-    path = tmp_path / 'bad.yaml'
-    path.write_text(text)
-    with pytest.raises(ConfigurationError, match=r'bad\.yaml'):
-        load_preset(str(path))
-    with pytest.raises(PeaceError, match='peace_cs'):
-        load_preset('no_such')
