@@ -141,9 +141,10 @@ def groups_of(node: str) -> tuple[Group, ...]:
 
         return ('', PromptingParameters), ('', PromptGeneratorOptions)
     if node == 'segmentation':
-        from peace_ros.core.segmentation import SegmentationParameters
+        from peace_ros.core.segmentation import FAMILIES, SegmentationParameters
 
-        return ('', SegmentationParameters), ('', SegmentationOptions)
+        families = [('', family.parameters) for family in FAMILIES.values()]
+        return ('', SegmentationParameters), *families, ('', SegmentationOptions)
     if node == 'landing':
         from peace_ros.core.landing import LandingParameters
         from peace_ros.core.mapping import MapParameters

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -24,14 +23,10 @@ from peace_ros.core.node_parameters import (
     unknown_name,
 )
 from peace_ros.core.resources import config_dir
-from peace_ros.core.yaml_files import read_yaml
+from peace_ros.core.segmentation import SegmentationParameters, family_of
+from peace_ros.core.yaml_files import WILDCARDS, Sections, read_sections
 
 DEFAULT_PRESET = 'peace_cs'
-WILDCARDS = ('/**', '/*')
-"""Sections that ROS reads for every node."""
-Sections = Mapping[str, Mapping[str, Any]]
-"""Section -> ROS name -> value, in the order of the file."""
-_REMEDY = 'give a ROS parameter file'
 _Parameters = TypeVar('_Parameters')
 
 
@@ -49,8 +44,8 @@ class Preset:
         Args:
             node: one of FLYING_NODES.
             parameters: one of its dataclasses.
-            given: fields that the file does not decide; an empty value (0, '') leaves it to
-                the file.
+            given: values that go before those of the file; empty ones ('', 0) do not, and names
+                of other dataclasses are passed over.
 
         Raises:
             ConfigurationError: a value of the wrong type or outside its bounds.
@@ -104,6 +99,7 @@ class Preset:
         for node in FLYING_NODES:
             for _, parameters in groups_of(node):
                 self.fill(node, parameters)
+        family_of(self.fill('segmentation', SegmentationParameters))
 
 
 def preset_names() -> list[str]:
@@ -131,33 +127,6 @@ def load_preset(name_or_path: Path | str = DEFAULT_PRESET) -> Preset:
     return preset
 
 
-def read_sections(path: Path) -> Sections:
-    """Return the sections of a ROS parameter file; groups of parameters become dotted names.
-
-    Raises:
-        ConfigurationError: the file cannot be read or a section has no parameters.
-
-    """
-    content = read_yaml(path, _REMEDY)
-    sections = dict(_sections_of(content)) if isinstance(content, dict) else {}
-    if not sections:
-        raise ConfigurationError(f'{path} holds no node: {_REMEDY}')
-    for section, values in sections.items():
-        if not isinstance(values, dict):
-            raise ConfigurationError(f'{path}: {section} has no ros__parameters: {_REMEDY}')
-    return {section: _flat(values) for section, values in sections.items()}
-
-
-def _sections_of(content: Mapping[str, Any], namespace: str = '') -> Iterator[tuple[str, Any]]:
-    """Yield section and what it holds; a namespace holds further sections."""
-    for name, section in content.items():
-        path = f'{namespace}/{name}' if namespace else str(name)
-        if isinstance(section, dict) and 'ros__parameters' not in section:
-            yield from _sections_of(section, path)
-        else:
-            yield path, section['ros__parameters'] if isinstance(section, dict) else None
-
-
 def _presets_dir() -> Path:
     return config_dir() / 'presets'
 
@@ -165,16 +134,6 @@ def _presets_dir() -> Path:
 def _node_of(section: str) -> str:
     """Return the node that a section is for; a namespace is none of ours."""
     return section.removeprefix('/**').removeprefix('/')
-
-
-def _flat(values: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for name, value in values.items():
-        if isinstance(value, dict):
-            flat.update(_flat(value, f'{prefix}{name}.'))
-        else:
-            flat[f'{prefix}{name}'] = value
-    return flat
 
 
 def _unknown_section(path: Path, section: str) -> ConfigurationError:

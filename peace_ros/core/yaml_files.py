@@ -1,16 +1,23 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading of YAML files as ROS reads them, but a name that is given twice is refused."""
+"""YAML files and ROS parameter files, read as ROS does, but a name that stands twice is refused."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from peace_ros.core.domain import ConfigurationError
+
+WILDCARDS = ('/**', '/*')
+"""Sections that ROS reads for every node."""
+Sections = Mapping[str, Mapping[str, Any]]
+"""Section -> ROS name -> value, in the order of the file."""
+_REMEDY = 'give a ROS parameter file'
 
 
 class _Loader(yaml.SafeLoader):
@@ -48,3 +55,40 @@ def read_yaml(path: Path, remedy: str) -> Any:
         raise ConfigurationError(f'{path}: {error.strerror}; {remedy}') from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ConfigurationError(f'{path}: not usable YAML ({error}); {remedy}') from error
+
+
+def read_sections(path: Path) -> Sections:
+    """Return the sections of a ROS parameter file; groups of parameters become dotted names.
+
+    Raises:
+        ConfigurationError: the file cannot be read or a section has no parameters.
+
+    """
+    content = read_yaml(path, _REMEDY)
+    sections = dict(_sections_of(content)) if isinstance(content, dict) else {}
+    if not sections:
+        raise ConfigurationError(f'{path} holds no node: {_REMEDY}')
+    for section, values in sections.items():
+        if not isinstance(values, dict):
+            raise ConfigurationError(f'{path}: {section} has no ros__parameters: {_REMEDY}')
+    return {section: _flat(values) for section, values in sections.items()}
+
+
+def _sections_of(content: Mapping[str, Any], namespace: str = '') -> Iterator[tuple[str, Any]]:
+    """Yield section and what it holds; a namespace holds further sections."""
+    for name, section in content.items():
+        path = f'{namespace}/{name}' if namespace else str(name)
+        if isinstance(section, dict) and 'ros__parameters' not in section:
+            yield from _sections_of(section, path)
+        else:
+            yield path, section['ros__parameters'] if isinstance(section, dict) else None
+
+
+def _flat(values: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, dict):
+            flat.update(_flat(value, f'{prefix}{name}.'))
+        else:
+            flat[f'{prefix}{name}'] = value
+    return flat

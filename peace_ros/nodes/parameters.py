@@ -27,7 +27,7 @@ from peace_ros.core.node_parameters import (
     ros_name,
     unknown_name,
 )
-from peace_ros.core.presets import WILDCARDS, read_sections
+from peace_ros.core.yaml_files import WILDCARDS, read_sections
 
 _Parameters = TypeVar('_Parameters')
 

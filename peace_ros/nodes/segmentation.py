@@ -13,15 +13,16 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CompressedImage, Image
 
 from peace_ros.core.domain import Frame, Heatmap, PeaceError, Prompt
+from peace_ros.core.messages import frame_from_message, prompt_from_message, stamp_ns_of
 from peace_ros.core.node_parameters import SegmentationOptions, groups_of
+from peace_ros.core.pipeline import Pipeline
 from peace_ros.core.prompting import categories_of, resolve_template
 from peace_ros.core.segmentation import (
-    CameraWatch,
     SegmentationParameters,
     Segmenter,
     create_segmenter,
     draw_overlay,
-    load_terms,
+    family_of,
 )
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
 from peace_ros.nodes.messages import (
@@ -29,11 +30,8 @@ from peace_ros.nodes.messages import (
     OK,
     WARN,
     diagnostic_array,
-    frame_from_message,
     heatmap_to_image,
     jpeg_message,
-    prompt_from_message,
-    stamp_ns,
 )
 from peace_ros.nodes.prompts import PromptBoard
 from peace_ros.nodes.qos import IMAGE_OUT, RESULT
@@ -63,9 +61,8 @@ class SegmentationNode(PeaceNode):
         self._options = self.filled(SegmentationOptions)
         template = resolve_template(self._options.template)
         self._static = None if categories_of(template) else Prompt(template, 0)
-        self._segmenter = segmenter or self._create_segmenter()
+        self._pipeline = Pipeline(segmenter or self._create_segmenter())
         self._board = PromptBoard()
-        self._camera = CameraWatch()
         self._prepared: set[str] = set()
         self._heatmap_out = self.create_publisher(Image, 'heatmap', IMAGE_OUT)
         self._overlay_out = self.create_publisher(CompressedImage, 'overlay/compressed', IMAGE_OUT)
@@ -80,15 +77,8 @@ class SegmentationNode(PeaceNode):
 
     def _create_segmenter(self) -> Segmenter:
         parameters = self.filled(SegmentationParameters)
-        segmenter = create_segmenter(
-            parameters.family, parameters.bundle, load_terms(parameters.terms), parameters
-        )
-        self.get_logger().info(f'model: {segmenter.footprint}')
-        for term, words in segmenter.unknown_terms.items():
-            self.get_logger().warning(
-                f'term {term!r}: the model has never learned {", ".join(words)} and cannot see it'
-            )
-        return segmenter
+        own = self.filled(family_of(parameters).parameters)
+        return create_segmenter(parameters, own, log=self.get_logger())
 
     def _on_image(self, message: ImageMessage) -> None:
         if self._static is None and self._board.is_empty:
@@ -109,7 +99,7 @@ class SegmentationNode(PeaceNode):
             self._preparer.offer(prompt)
 
     def _prepare(self, prompt: Prompt) -> None:
-        self._segmenter.prepare(prompt)
+        self._pipeline.segmenter.prepare(prompt)
         self._prepared.add(prompt.template)
         self._board.put(prompt)
 
@@ -121,14 +111,13 @@ class SegmentationNode(PeaceNode):
         return None if prompt is None else (prompt, prompt.stamp_ns == at_ns)
 
     def _segment(self, message: ImageMessage) -> None:
-        chosen = self._prompt_for(stamp_ns(message))
+        chosen = self._prompt_for(stamp_ns_of(message))
         if chosen is None:
             return
         prompt, own = chosen
         began = time.monotonic()
         frame = frame_from_message(message)
-        self._camera.check(frame)
-        heatmap = self._segmenter.segment(frame, prompt)
+        heatmap = self._pipeline.heatmap(frame, prompt)
         self._heatmap_out.publish(heatmap_to_image(heatmap, message.header.frame_id))
         work_s = time.monotonic() - began
         if self._overlay_out.get_subscription_count() > 0:

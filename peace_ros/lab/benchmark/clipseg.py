@@ -16,6 +16,7 @@ from peace_ros.core.inference import Bundle, ClipEncoder, Preprocessor, TextEnco
 from peace_ros.core.inference.contract import IS_POSITIVE, PIXEL_VALUES, TERM_LOGITS, TEXT_EMBEDDING
 from peace_ros.core.prompting import PromptGenerator, PromptingParameters, load_vocabularies
 from peace_ros.core.segmentation import (
+    ClipSegParameters,
     ClipSegSegmenter,
     SegmentationParameters,
     Segmenter,
@@ -127,10 +128,8 @@ class TimedCores:
 
 def _segmenter(setup: Setup, terms: Any) -> ClipSegSegmenter:
     # The reference sees a frame once, so one look is what is compared.
-    parameters = SegmentationParameters(
-        threads=setup.threads, providers=(setup.provider,), clipseg_max_looks=1
-    )
-    return ClipSegSegmenter(Bundle.load(setup.clipseg), terms, parameters)
+    parameters = SegmentationParameters(threads=setup.threads, providers=(setup.provider,))
+    return ClipSegSegmenter(setup.clipseg, terms, parameters, ClipSegParameters(1))
 
 
 def _ranking_of_every_frame(encoder: ClipEncoder, frames: list[Frame]) -> float:

@@ -13,7 +13,7 @@ from peace_ros.core.domain import Prompt
 from peace_ros.core.inference import Bundle, ClipEncoder, open_sessions
 from peace_ros.core.inference.contract import IMAGE_EMBEDDING, PIXEL_VALUES, PREDICTIONS, PROTOTYPES
 from peace_ros.core.prompting import PromptGenerator, PromptingParameters, load_vocabularies
-from peace_ros.core.segmentation import FastSamSegmenter, SegmentationParameters
+from peace_ros.core.segmentation import FastSamParameters, FastSamSegmenter, SegmentationParameters
 from peace_ros.core.segmentation.fastsam import Letterbox, assemble, detect
 from peace_ros.core.segmentation.fastsam.crops import Cutter
 from peace_ros.core.segmentation.fastsam.selection import select
@@ -84,7 +84,7 @@ def _segmenter(setup: FastSamSetup, terms: Terms) -> FastSamSegmenter:
     parameters = SegmentationParameters(
         family='fastsam', threads=setup.threads, providers=(setup.provider,)
     )
-    return FastSamSegmenter(Bundle.load(setup.fastsam), terms, parameters)
+    return FastSamSegmenter(setup.fastsam, terms, parameters)
 
 
 def _steady_calls(
@@ -113,7 +113,7 @@ def _cost_of_terms(setup: FastSamSetup, thirteen: FastSamSegmenter, frames: list
 
 def _parts_of(setup: FastSamSetup, frames: list[Frame]) -> dict[str, Spread]:
     """Time the steps within a segmentation, with its own parts."""
-    bundle, parameters = Bundle.load(setup.fastsam), SegmentationParameters()
+    bundle, parameters = Bundle.load(setup.fastsam), FastSamParameters()
     sessions = open_sessions(
         bundle,
         ('segmenter', 'image_encoder'),

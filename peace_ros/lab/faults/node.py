@@ -21,15 +21,11 @@ from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
 from peace_ros.core.domain import Pose, VehicleError
+from peace_ros.core.messages import diagnostic_values, ns_from_time, pose_from_message
 from peace_ros.lab.faults.record import Said, TruthSample
 from peace_ros.lab.faults.tamper import Tamper, untouched
 from peace_ros.nodes import qos
-from peace_ros.nodes.messages import (
-    diagnostic_values,
-    ns_from_time,
-    pose_from_message,
-    time_from_ns,
-)
+from peace_ros.nodes.messages import time_from_ns
 
 IMAGE, HEATMAP, PROMPT = 'image', 'heatmap', 'prompt'
 RAW = 'raw/'

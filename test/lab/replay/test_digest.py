@@ -93,7 +93,7 @@ def decided_over(stamps_ns: np.ndarray, heatmaps: np.ndarray) -> dict[str, np.nd
     class Line(ReplayLine):
         def __init__(self, *given, **options) -> None:
             super().__init__(*given, **options)
-            self.segmenter = StoredSegmenter(stamps_ns, heatmaps)
+            self.pipeline.segmenter = StoredSegmenter(stamps_ns, heatmaps)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run, 'ReplayLine', Line)

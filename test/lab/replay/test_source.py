@@ -13,7 +13,7 @@ import pytest
 from peace_ros.core.domain import RecordingError
 from peace_ros.lab.replay import SourceOptions, open_source
 from peace_ros.recording import BagWriter, VideoWriter
-from peace_ros.recording.messages import diagnostic_array, jpeg_image, pose_stamped
+from peace_ros.recording.messages import diagnostic_array, jpeg_message, pose_stamped
 
 SMALL = Path(__file__).resolve().parents[2] / 'data' / 'small.mcap'
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -30,7 +30,7 @@ def write_bag(path: Path, *, topics=('/image/compressed',), frames: int = 6, bro
             stamp_ns = k * SECOND // 2
             bag.write('/ground_truth/pose', stamp_ns, pose_stamped(stamp_ns, (0, 0, 50), LEVEL))
             for topic in topics:
-                image = jpeg_image(picture(20 * k), stamp_ns)
+                image = jpeg_message(picture(20 * k), stamp_ns)
                 if k in broken:
                     image.data = image.data[:40]
                 bag.write(topic, stamp_ns, image)
@@ -84,10 +84,10 @@ def test_a_frame_that_is_cut_short_is_told_and_the_others_are_used(tmp_path) -> 
 def test_the_recorded_engagement_is_found(tmp_path) -> None:
     with BagWriter(tmp_path / 'a.mcap') as bag:
         for k, state in enumerate(('IDLE', 'IDLE', 'SEARCHING', 'AIMING'), start=1):
-            status = diagnostic_array(k * SECOND, 'landing', 0, '', {'state': state})
+            status = diagnostic_array(k * SECOND, 'landing', 0, '', [('state', state)])
             bag.write('/landing/status', k * SECOND, status)
             bag.write('/pose', k * SECOND, pose_stamped(k * SECOND, (0, 0, 50), LEVEL))
-            bag.write('/image', k * SECOND, jpeg_image(picture(9), k * SECOND))
+            bag.write('/image', k * SECOND, jpeg_message(picture(9), k * SECOND))
     assert open_source(tmp_path / 'a.mcap', SourceOptions()).engage_ns == 3 * SECOND
 
 

@@ -55,7 +55,7 @@ class _Bench:
             )
         threads = cores.segmentation.threads
         self.segmenter = FeatureSegmenter(
-            cores.bundle, cores.segmenter.terms, threads, cores.segmentation.clipseg_max_looks
+            cores.bundle, cores.segmenter.terms, threads, cores.own.clipseg_max_looks
         )
         clip = ClipEncoder(Bundle.load(cores.prompting.bundle), threads=threads)
         self._encoder = SharedEncoder(clip)

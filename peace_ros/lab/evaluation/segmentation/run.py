@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import Frame
+from peace_ros.core.domain import Frame, ImageError
 from peace_ros.lab.evaluation.segmentation.cores import Cores
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError, SampleError
 from peace_ros.lab.evaluation.segmentation.histograms import BINS, LABELS, count_labels, count_terms
@@ -84,14 +84,26 @@ class TileLook:
     seconds: float
 
 
-def looks(image_rgb: NDArray[np.uint8], cores: Cores, tile_px: int | None) -> Iterator[TileLook]:
-    """Yield what a configuration makes of each tile of an image."""
+def looks(
+    image_rgb: NDArray[np.uint8],
+    cores: Cores,
+    tile_px: int | None,
+    refuse: Callable[[str], object] = lambda _: None,
+) -> Iterator[TileLook]:
+    """Yield what a configuration makes of each tile; ``refuse`` is told why there is none of one.
+
+    A flight gets no heatmap of such a picture either.
+    """
     height_px, width_px = image_rgb.shape[:2]
     for tile in tiles_of(height_px, width_px, tile_px):
         frame = Frame(np.ascontiguousarray(image_rgb[tile.rows, tile.columns]), 0)
         start = time.perf_counter()
-        prompt = cores.prompt(frame)
-        heatmap = cores.segment(frame, prompt)
+        try:
+            prompt = cores.prompt(frame)
+            heatmap = cores.segment(frame, prompt)
+        except ImageError as error:
+            refuse(str(error))
+            continue
         seconds = time.perf_counter() - start
         height, width = frame.image_rgb.shape[:2]
         safety = heatmap.safety
@@ -133,7 +145,13 @@ def evaluate(
         pair = _load(sample, skipped, strict=strict)
         if pair is not None:
             for cores in configurations:
-                _score(sample.name, pair, cores, tile_px, tallies[cores.name], score_terms)
+                tally = tallies[cores.name]
+                refused = _score(sample.name, pair, cores, tile_px, tally, score_terms)
+            # The camera watch refuses the same tiles whatever the configuration.
+            if refused and strict:
+                raise DatasetError(f'{sample.name}: {refused[0]} (--strict)')
+            if refused:
+                skipped.append(Skipped(sample.name, f'{len(refused)} tiles refused: {refused[0]}'))
         if report is not None:
             report(done)
     if not any(tally.frames for tally in tallies.values()):
@@ -154,13 +172,15 @@ def _load(sample: Sample, skipped: list[Skipped], *, strict: bool) -> Pair | Non
 
 def _score(
     name: str, pair: Pair, cores: Cores, tile_px: int | None, tally: Tally, score_terms: bool
-) -> None:
+) -> list[str]:
+    """Score an image; return why tiles of it got no heatmap."""
     image, labels = pair
     counts = np.zeros((LABELS, BINS), np.uint32)
     scored = tally.meanings.any(axis=1)
     terms = np.zeros((int(scored.sum()), 2, BINS), np.uint32)
     seconds, tiles = 0.0, 0
-    for look in looks(image, cores, tile_px):
+    refused: list[str] = []
+    for look in looks(image, cores, tile_px, refused.append):
         own = look.tile.labels_of(labels)
         counts += count_labels(own, look.safety)
         seconds, tiles = seconds + look.seconds, tiles + 1
@@ -169,8 +189,11 @@ def _score(
             maps = cores.segmenter.term_maps(look.frame, cores.prompt(look.frame))
             height, width = maps.shape[1:]
             terms += count_terms(nearest(own, width, height), maps[scored], tally.meanings[scored])
+    if not tiles:
+        return refused
     tally.names.append(name)
     tally.counts.append(counts)
     tally.term_counts.append(terms)
     tally.tiles.append(tiles)
     tally.seconds.append(seconds)
+    return refused

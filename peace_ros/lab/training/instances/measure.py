@@ -11,8 +11,9 @@ import numpy as np
 
 from peace_ros.core.domain import Frame, Label, Prompt, is_safe
 from peace_ros.core.inference import Bundle
+from peace_ros.core.pipeline import segmentation_of
 from peace_ros.core.presets import load_preset
-from peace_ros.core.segmentation import SegmentationParameters, load_terms
+from peace_ros.core.segmentation import load_terms
 from peace_ros.core.segmentation.fastsam import FastSamSegmenter
 from peace_ros.lab.training.measure import Example
 from peace_ros.lab.training.sources import FRAME_PX, VALIDATION_SEED, load_drawn
@@ -69,10 +70,8 @@ def drawn_frames(cache: Path, seeds: range) -> list[Example]:
 
 def open_segmenter(bundle: Bundle, threads: int = 1) -> FastSamSegmenter:
     """Return the bundle ready to run, with the shipped terms and the parameters of its preset."""
-    parameters = load_preset(PRESET).fill(
-        'segmentation', SegmentationParameters, bundle=str(bundle.folder), threads=threads
-    )
-    return FastSamSegmenter(bundle, load_terms(), parameters)
+    parameters, own = segmentation_of(load_preset(PRESET), threads=threads)
+    return FastSamSegmenter(bundle, load_terms(), parameters, own)
 
 
 def measure(folder: Path, examples: Sequence[Example], *, threads: int = 1) -> InstanceReport:
