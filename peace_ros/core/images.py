@@ -8,6 +8,7 @@ Nodes and recordings read by the same rules; nothing here imports ROS or a type 
 from __future__ import annotations
 
 import struct
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -126,6 +127,22 @@ def rgb_from_compressed(kind: str, data: Any) -> NDArray[np.uint8]:
     if bgr is None:
         raise _damaged(kind, encoded)
     return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+
+
+def read_image(path: Path | str) -> NDArray[np.uint8]:
+    """Return the height x width x 3 RGB array of a JPEG or PNG file.
+
+    Raises:
+        ImageError: it cannot be read; see :func:`rgb_from_compressed`.
+
+    """
+    file = Path(path).expanduser()
+    try:
+        return rgb_from_compressed(file.suffix.lstrip('.'), file.read_bytes())
+    except OSError as error:
+        raise ImageError(f'{file}: {error.strerror}: give a JPEG or PNG file') from error
+    except ImageError as error:
+        raise ImageError(f'{file}: {error}') from error
 
 
 def jpeg_from_rgb(image_rgb: NDArray[np.uint8], quality: int) -> bytes:

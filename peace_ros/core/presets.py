@@ -1,21 +1,32 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Presets are ROS parameter files; this fills the nodes' dataclasses from them, without ROS."""
+"""Presets are ROS parameter files; this reads them, as strictly as a node does, without ROS."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
-
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.domain.parameters import describe
+from peace_ros.core.node_parameters import (
+    FLYING_NODES,
+    SIMULATOR_NODES,
+    converted,
+    groups_of,
+    is_of_ros,
+    named,
+    refuse_misspelt,
+    ros_name,
+    unknown_name,
+)
 from peace_ros.core.resources import config_dir
+from peace_ros.core.segmentation import SegmentationParameters, family_of
+from peace_ros.core.yaml_files import WILDCARDS, Sections, read_sections
 
 DEFAULT_PRESET = 'peace_cs'
-_EVERYWHERE = ('/**', '/*')
 _Parameters = TypeVar('_Parameters')
 
 
@@ -25,44 +36,70 @@ class Preset:
 
     name: str
     path: Path
-    nodes: dict[str, dict[str, Any]]
-    """Node name (or ``/**``) -> its parameters."""
-
-    def values_for(self, node: str) -> dict[str, Any]:
-        """Return what a node of that name gets: the wildcards' values, then its own."""
-        values: dict[str, Any] = {}
-        for key in (*_EVERYWHERE, node, f'/{node}', f'/**/{node}'):
-            values.update(self.nodes.get(key, {}))
-        return values
+    sections: Sections
 
     def fill(self, node: str, parameters: type[_Parameters], **given: Any) -> _Parameters:
-        """Return a parameter dataclass with the values of a node; ``given`` ones go before.
+        """Return one of a node's parameter dataclasses with the values of the file.
+
+        Args:
+            node: one of FLYING_NODES.
+            parameters: one of its dataclasses.
+            given: values that go before those of the file; empty ones ('', 0) do not, and names
+                of other dataclasses are passed over.
 
         Raises:
             ConfigurationError: a value of the wrong type or outside its bounds.
 
         """
-        values = self.values_for(node)
+        prefix = next(prefix for prefix, each in groups_of(node) if each is parameters)
+        values = self._values_for(node)
         chosen: dict[str, Any] = {}
-        for info in describe(parameters):
-            if info.name in given:
-                chosen[info.name] = given[info.name]
-            elif info.name in values:
-                chosen[info.name] = self._converted(node, info.name, values, info.default)
-        return parameters(**chosen)
+        try:
+            for info in describe(parameters):
+                name = ros_name(prefix, info)
+                if given.get(info.name):
+                    chosen[info.name] = given[info.name]
+                elif name in values:
+                    chosen[info.name] = converted(name, info, values[name])
+            return parameters(**chosen)
+        except ConfigurationError as error:
+            raise ConfigurationError(f'{self.path}: {node}: {error}') from error
 
-    def _converted(self, node: str, name: str, values: dict[str, Any], default: Any) -> Any:
-        value = values[name]
-        expected = type(default)
-        if expected is float and type(value) is int:
-            return float(value)
-        if expected is tuple and isinstance(value, list):
-            return tuple(value)
-        if type(value) is not expected:
-            raise ConfigurationError(
-                f'{self.path}: {node}.{name} = {value!r}: give a value such as {default!r}'
-            )
-        return value
+    def _values_for(self, node: str) -> dict[str, Any]:
+        """Return what a node of that name gets: of equal names the last in the file counts."""
+        values: dict[str, Any] = {}
+        for section, given in self.sections.items():
+            if section in WILDCARDS or _node_of(section) == node:
+                values.update(given)
+        return values
+
+    def check(self) -> None:
+        """Refuse what a node would refuse.
+
+        Raises:
+            ConfigurationError: a node or parameter is unknown, or a value cannot be used.
+
+        """
+        known = {node: named(groups_of(node)) for node in FLYING_NODES}
+        for section, values in self.sections.items():
+            node = _node_of(section)
+            if section not in WILDCARDS and node not in (*FLYING_NODES, *SIMULATOR_NODES):
+                raise _unknown_section(self.path, section)
+            for name in values:
+                if is_of_ros(name) or node in SIMULATOR_NODES:
+                    continue
+                try:
+                    if section in WILDCARDS:
+                        every = {each for names in known.values() for each in names}
+                        refuse_misspelt(name, section, every)
+                    elif name not in known[node]:
+                        raise unknown_name(name, node, known[node])
+                except ConfigurationError as error:
+                    raise ConfigurationError(f'{self.path}: {error}') from error
+        for node in FLYING_NODES:
+            for _, parameters in groups_of(node):
+                self.fill(node, parameters)
+        family_of(self.fill('segmentation', SegmentationParameters))
 
 
 def preset_names() -> list[str]:
@@ -70,40 +107,37 @@ def preset_names() -> list[str]:
     return sorted(path.stem for path in _presets_dir().glob('*.yaml'))
 
 
-def load_preset(name_or_path: str = DEFAULT_PRESET) -> Preset:
+def load_preset(name_or_path: Path | str = DEFAULT_PRESET) -> Preset:
     """Read a shipped preset by name (``peace_cs``, also written ``PEACE-CS``) or a file by path.
 
     Raises:
-        ConfigurationError: there is none, or it is no ROS parameter file.
+        ConfigurationError: there is none, it is no ROS parameter file, or a node would refuse it.
 
     """
     path = Path(name_or_path)
     if path.suffix not in {'.yaml', '.yml'}:
-        path = _presets_dir() / f'{name_or_path.lower().replace("-", "_")}.yaml'
+        path = _presets_dir() / f'{str(name_or_path).lower().replace("-", "_")}.yaml'
     if not path.is_file():
         raise ConfigurationError(
-            f'preset {name_or_path!r} does not exist: choose one of {", ".join(preset_names())}, '
-            'or give a ROS parameter file'
+            f'preset {str(name_or_path)!r} does not exist: choose one of '
+            f'{", ".join(preset_names())}, or give a ROS parameter file'
         )
-    return Preset(path.stem, path, _read(path))
+    preset = Preset(path.stem, path, read_sections(path))
+    preset.check()
+    return preset
 
 
 def _presets_dir() -> Path:
     return config_dir() / 'presets'
 
 
-def _read(path: Path) -> dict[str, dict[str, Any]]:
-    try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f'{path} cannot be read as YAML: {error}') from error
-    nodes = {}
-    for name, section in content.items() if isinstance(content, dict) else ():
-        if not isinstance(section, dict) or not isinstance(section.get('ros__parameters'), dict):
-            raise ConfigurationError(
-                f'{path}: {name} has no ros__parameters: give a ROS parameter file'
-            )
-        nodes[str(name)] = section['ros__parameters']
-    if not nodes:
-        raise ConfigurationError(f'{path} holds no node: give a ROS parameter file')
-    return nodes
+def _node_of(section: str) -> str:
+    """Return the node that a section is for; a namespace is none of ours."""
+    return section.removeprefix('/**').removeprefix('/')
+
+
+def _unknown_section(path: Path, section: str) -> ConfigurationError:
+    names = (*FLYING_NODES, *SIMULATOR_NODES)
+    near = get_close_matches(section.rpartition('/')[2], names, n=1)
+    remedy = f'did you mean {near[0]}?' if near else f'choose among {", ".join(names)}, /**'
+    return ConfigurationError(f'{path}: node {section} is unknown: {remedy}')

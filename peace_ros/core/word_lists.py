@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.resources import config_dir
+from peace_ros.core.yaml_files import read_yaml
 
 
 def find_word_lists(path: Path | str) -> Path:
@@ -27,20 +26,12 @@ def read_word_lists(path: Path, names: Sequence[str]) -> dict[str, tuple[str, ..
 
     Raises:
         ConfigurationError: the file cannot be read, another list is there, one is missing or
-            twice, or something in it is no text (YAML reads ``no`` as false).
+            twice, or something in it is not a text (YAML reads ``no`` as false).
 
     """
     expected = f'give the lists {" and ".join(names)}, each once'
-    try:
-        text = path.read_text(encoding='utf-8')
-        document = yaml.safe_load(text)
-        # Of two equal keys the loader keeps the last in silence; the tree holds both.
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except OSError as error:
-        raise ConfigurationError(f'{path}: {error.strerror}; {expected}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f'{path}: not YAML ({error}); correct it') from error
-    keys = [str(key.value) for key, _ in root.value] if isinstance(root, yaml.MappingNode) else []
+    document = read_yaml(path, expected)
+    keys = list(map(str, document)) if isinstance(document, dict) else []
     if sorted(keys) != sorted(names):
         raise ConfigurationError(f'{path}: has {", ".join(keys) or "no lists"}; {expected}')
     return {name: _texts(document[name], f'{path}: {name}') for name in names}
@@ -51,5 +42,5 @@ def _texts(values: Any, where: str) -> tuple[str, ...]:
         raise ConfigurationError(f'{where}: {values!r}; give a list ([] for none)')
     for value in values:
         if not isinstance(value, str):
-            raise ConfigurationError(f'{where}: {value!r} is no text; put it in quotes')
+            raise ConfigurationError(f'{where}: {value!r} is not a text; put it in quotes')
     return tuple(values)

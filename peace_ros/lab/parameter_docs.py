@@ -10,24 +10,21 @@ from __future__ import annotations
 
 import sys
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 import yaml
 
 from peace_ros.core.domain.parameters import ParameterInfo, describe
-from peace_ros.nodes import landing, prompt_generator, segmentation
-from peace_ros.nodes.parameters import Group, ros_name
-from peace_ros.simulation.nodes import autopilot_sim, satellite_view
+from peace_ros.core.node_parameters import FLYING_NODES, Group, groups_of, named
+from peace_ros.simulation.nodes.options import AUTOPILOT_SIM, SATELLITE_VIEW
 
 NODE_PARAMETERS: Mapping[str, tuple[Group, ...]] = MappingProxyType(
     {
-        'prompt_generator': prompt_generator.PARAMETERS,
-        'segmentation': segmentation.PARAMETERS,
-        'landing': landing.PARAMETERS,
-        'satellite_view': satellite_view.PARAMETERS,
-        'autopilot_sim': autopilot_sim.PARAMETERS,
+        **{node: groups_of(node) for node in FLYING_NODES},
+        'satellite_view': SATELLITE_VIEW,
+        'autopilot_sim': AUTOPILOT_SIM,
     }
 )
 """Node -> its groups of parameters."""
@@ -57,7 +54,7 @@ def markdown() -> str:
             f'\n## {node}\n\n| parameter | default | unit | allowed | meaning |\n'
             '|---|---|---|---|---|\n'
         )
-        parts.extend(_row(name, info) for name, info in named(groups))
+        parts.extend(_row(name, info) for name, info in named(groups).items())
     return ''.join(parts)
 
 
@@ -74,13 +71,6 @@ def defaults_yaml() -> str:
             indent = ' ' * (6 if group else 4)
             parts.extend(_yaml_entry(info, indent) for info in describe(parameters))
     return ''.join(parts)
-
-
-def named(groups: Sequence[Group]) -> Iterator[tuple[str, ParameterInfo]]:
-    """Yield the ROS name and description of every parameter of a node."""
-    for group, parameters in groups:
-        for info in describe(parameters):
-            yield ros_name(group, info), info
 
 
 def _row(name: str, info: ParameterInfo) -> str:

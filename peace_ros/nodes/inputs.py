@@ -14,8 +14,8 @@ from sensor_msgs.msg import CompressedImage, Image
 
 from peace_ros.core.domain import PeaceError
 from peace_ros.core.landing import LandingCore
-from peace_ros.nodes.messages import depth_from_image, frame_from_message, heatmap_from_image
-from peace_ros.nodes.options import LandingOptions
+from peace_ros.core.messages import depth_from_image, frame_from_message, heatmap_from_image
+from peace_ros.core.node_parameters import LandingOptions
 from peace_ros.nodes.qos import IMAGE_IN
 from peace_ros.nodes.runtime import PeaceNode
 

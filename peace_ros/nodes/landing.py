@@ -16,23 +16,13 @@ from rclpy.clock import Clock, ClockType
 from peace_ros.core.domain import Setpoint, Telemetry, VehicleError
 from peace_ros.core.landing import Decision, LandingCore, LandingParameters, State
 from peace_ros.core.mapping import MapParameters
+from peace_ros.core.node_parameters import CameraOptions, LandingOptions, groups_of
 from peace_ros.core.vehicle import SenderParameters, SetpointSender, VehicleLink, VehicleParameters
 from peace_ros.nodes.engagement import SILENT_STATES, EngagementServices, reason_against
 from peace_ros.nodes.inputs import LandingInputs
-from peace_ros.nodes.options import CameraOptions, LandingOptions
-from peace_ros.nodes.parameters import Group
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.status import DecisionPublisher, VehicleSituation
 from peace_ros.nodes.vehicle_access import VehicleAccess
-
-PARAMETERS: tuple[Group, ...] = (
-    ('', LandingOptions),
-    ('', CameraOptions),
-    ('', LandingParameters),
-    ('', MapParameters),
-    ('vehicle', VehicleParameters),
-    ('sender', SenderParameters),
-)
 
 
 class LandingNode(PeaceNode):
@@ -45,7 +35,7 @@ class LandingNode(PeaceNode):
             ConfigurationError: parameters cannot be used.
 
         """
-        super().__init__('landing', *PARAMETERS, **options)
+        super().__init__('landing', *groups_of('landing'), **options)
         self._options = self.filled(LandingOptions)
         self._landing = self.filled(LandingParameters)
         self._core = LandingCore(

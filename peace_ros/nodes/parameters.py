@@ -8,22 +8,31 @@ to change it.
 
 from __future__ import annotations
 
-from difflib import get_close_matches
+import sys
+from itertools import pairwise
+from pathlib import Path
 from sys import float_info
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.domain.parameters import ParameterInfo, describe
+from peace_ros.core.node_parameters import (
+    Group,
+    converted,
+    is_of_ros,
+    named,
+    refuse_misspelt,
+    ros_name,
+    unknown_name,
+)
+from peace_ros.core.yaml_files import WILDCARDS, read_sections
 
 _Parameters = TypeVar('_Parameters')
-Group = tuple[str, type[Any]]
-"""Prefix of the ROS names (empty for none) and the dataclass behind them."""
 
+_FILE = '--params-file'
 _INT64_MAX = 2**63 - 1
-_OF_RCLPY = ('use_sim_time', 'start_type_description_service')
 
 
 def declare_parameters(node: Node, parameters: type[_Parameters], group: str = '') -> _Parameters:
@@ -43,7 +52,7 @@ def declare_parameters(node: Node, parameters: type[_Parameters], group: str = '
         name = ros_name(group, info)
         values[info.name] = info.default
         if node.has_parameter(name):
-            values[info.name] = _converted(name, info, node.get_parameter(name).value)
+            values[info.name] = converted(name, info, node.get_parameter(name).value)
             node.undeclare_parameter(name)
     filled = parameters(**values)
     for info in infos:
@@ -56,19 +65,34 @@ def declare_parameters(node: Node, parameters: type[_Parameters], group: str = '
 
 
 def refuse_unknown(node: Node, *groups: Group) -> None:
-    """Raise ConfigurationError when a value was given for a parameter that nobody declares."""
-    names = [ros_name(group, info) for group, each in groups for info in describe(each)]
+    """Refuse values for parameters that nobody declares; those for every node may be of others.
+
+    Raises:
+        ConfigurationError: a parameter is unknown.
+
+    """
+    known = named(groups)
+    foreign = _only_in_wildcards(sys.argv, node.get_name())
     for name in node.get_parameters_by_prefix(''):
-        if name in names or name in _OF_RCLPY or name.startswith('qos_overrides.'):
+        if name in known or is_of_ros(name):
             continue
-        near = get_close_matches(name, names, n=1)
-        remedy = f'did you mean {near[0]}?' if near else 'see docs/parameters.md'
-        raise ConfigurationError(f'parameter {name} of {node.get_name()} is unknown: {remedy}')
+        if name not in foreign:
+            raise unknown_name(name, node.get_name(), known)
+        refuse_misspelt(name, foreign[name], known)
+        node.get_logger().info(f'parameter {name} of section {foreign[name]} is left to others')
 
 
-def ros_name(group: str, info: ParameterInfo) -> str:
-    """Return the ROS name of a parameter of a group; the empty group has no prefix."""
-    return f'{group}.{info.name}' if group else info.name
+def _only_in_wildcards(arguments: list[str], node: str) -> dict[str, str]:
+    """Return parameter -> section, of what parameter files give to all nodes and not to this."""
+    wild: dict[str, str] = {}
+    own: set[str] = set()
+    for option, path in pairwise(arguments):
+        for section, values in read_sections(Path(path)).items() if option == _FILE else ():
+            if section in WILDCARDS:
+                wild.update(dict.fromkeys(values, section))
+            elif section.rpartition('/')[2] == node:
+                own.update(values)
+    return {name: section for name, section in wild.items() if name not in own}
 
 
 def descriptor_of(info: ParameterInfo) -> ParameterDescriptor:
@@ -92,29 +116,3 @@ def descriptor_of(info: ParameterInfo) -> ParameterDescriptor:
             )
         ]
     return descriptor
-
-
-def _converted(name: str, info: ParameterInfo, value: Any) -> Any:
-    """Return a given value in the type of the default; whole numbers serve as floats."""
-    expected = type(info.default)
-    if expected is float and type(value) is int:
-        return float(value)
-    if expected is tuple and not isinstance(value, str | bool | int | float) and value is not None:
-        element = type(info.default[0]) if info.default else str
-        if all(isinstance(each, element) for each in value):
-            return tuple(value)
-    if type(value) is expected:
-        return value
-    raise ConfigurationError(
-        f'parameter {name} = {value!r}: give {_NAMES.get(expected, "another type")}, '
-        f'such as {info.default!r}'
-    )
-
-
-_NAMES = {
-    bool: 'true or false',
-    int: 'a whole number',
-    float: 'a number',
-    str: 'a text',
-    tuple: 'a list',
-}

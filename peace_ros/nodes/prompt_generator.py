@@ -6,59 +6,25 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
 from peace_ros.core.domain import PeaceError
-from peace_ros.core.inference import Bundle, ClipEncoder
+from peace_ros.core.messages import frame_from_message
+from peace_ros.core.node_parameters import PromptGeneratorOptions, groups_of
+from peace_ros.core.pipeline import create_generator
 from peace_ros.core.prompting import (
     PromptGenerator,
     PromptingParameters,
-    categories_of,
-    load_vocabularies,
     resolve_template,
 )
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
-from peace_ros.nodes.messages import (
-    ERROR,
-    OK,
-    diagnostic_array,
-    frame_from_message,
-    prompt_to_message,
-)
-from peace_ros.nodes.options import PromptGeneratorOptions
-from peace_ros.nodes.parameters import Group
+from peace_ros.nodes.messages import ERROR, OK, diagnostic_array, prompt_to_message
 from peace_ros.nodes.qos import RESULT
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.worker import NewestWorker
-
-PARAMETERS: tuple[Group, ...] = (('', PromptingParameters), ('', PromptGeneratorOptions))
-
-
-def create_generator(
-    parameters: PromptingParameters, say: Callable[[str], object] | None = None
-) -> PromptGenerator:
-    """Make the generator; a static template needs neither a model nor vocabularies.
-
-    Args:
-        parameters: of the prompts.
-        say: is told what the networks run on and take.
-    """
-    if not categories_of(resolve_template(parameters.template)):
-        return PromptGenerator(None, None, parameters)
-    vocabularies = load_vocabularies(parameters.vocabularies)
-    encoder = ClipEncoder(
-        Bundle.load(parameters.bundle),
-        threads=parameters.threads,
-        providers=parameters.providers,
-        cache_dir=Path(parameters.cache_dir).expanduser() if parameters.cache_dir else None,
-    )
-    if say is not None:
-        say(f'model: {encoder.footprint}')
-    return PromptGenerator(encoder, vocabularies, parameters)
 
 
 class PromptGeneratorNode(PeaceNode):
@@ -75,9 +41,9 @@ class PromptGeneratorNode(PeaceNode):
             PeaceError: parameters, vocabularies or bundle cannot be used.
 
         """
-        super().__init__('prompt_generator', *PARAMETERS, **options)
+        super().__init__('prompt_generator', *groups_of('prompt_generator'), **options)
         parameters = self.filled(PromptingParameters)
-        self._generator = generator or create_generator(parameters, self.get_logger().info)
+        self._generator = generator or create_generator(parameters, self.get_logger())
         self._last_template = ''
         self._prompt_out = self.create_publisher(DiagnosticArray, 'prompt', RESULT)
         self._diagnostics_out = self.create_publisher(DiagnosticArray, '/diagnostics', RESULT)

@@ -27,7 +27,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from peace_ros.core.domain import ConfigurationError, PeaceError
-from peace_ros.nodes.parameters import Group, declare_parameters, refuse_unknown
+from peace_ros.core.node_parameters import Group
+from peace_ros.nodes.parameters import declare_parameters, refuse_unknown
 
 _Parameters = TypeVar('_Parameters')
 

@@ -13,14 +13,16 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CompressedImage, Image
 
 from peace_ros.core.domain import Frame, Heatmap, PeaceError, Prompt
+from peace_ros.core.messages import frame_from_message, prompt_from_message, stamp_ns_of
+from peace_ros.core.node_parameters import SegmentationOptions, groups_of
+from peace_ros.core.pipeline import Pipeline
 from peace_ros.core.prompting import categories_of, resolve_template
 from peace_ros.core.segmentation import (
-    CameraWatch,
     SegmentationParameters,
     Segmenter,
     create_segmenter,
     draw_overlay,
-    load_terms,
+    family_of,
 )
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
 from peace_ros.nodes.messages import (
@@ -28,20 +30,14 @@ from peace_ros.nodes.messages import (
     OK,
     WARN,
     diagnostic_array,
-    frame_from_message,
     heatmap_to_image,
     jpeg_message,
-    prompt_from_message,
-    stamp_ns,
 )
-from peace_ros.nodes.options import SegmentationOptions
-from peace_ros.nodes.parameters import Group
 from peace_ros.nodes.prompts import PromptBoard
 from peace_ros.nodes.qos import IMAGE_OUT, RESULT
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.worker import NewestWorker
 
-PARAMETERS: tuple[Group, ...] = (('', SegmentationParameters), ('', SegmentationOptions))
 _NAME = 'segmentation'
 _SLOW_S = 1.0
 """Work for one frame that leaves little of the age that the landing allows a heatmap."""
@@ -61,13 +57,12 @@ class SegmentationNode(PeaceNode):
             PeaceError: parameters, terms or bundle cannot be used.
 
         """
-        super().__init__(_NAME, *PARAMETERS, **options)
+        super().__init__(_NAME, *groups_of(_NAME), **options)
         self._options = self.filled(SegmentationOptions)
         template = resolve_template(self._options.template)
         self._static = None if categories_of(template) else Prompt(template, 0)
-        self._segmenter = segmenter or self._create_segmenter()
+        self._pipeline = Pipeline(segmenter or self._create_segmenter())
         self._board = PromptBoard()
-        self._camera = CameraWatch()
         self._prepared: set[str] = set()
         self._heatmap_out = self.create_publisher(Image, 'heatmap', IMAGE_OUT)
         self._overlay_out = self.create_publisher(CompressedImage, 'overlay/compressed', IMAGE_OUT)
@@ -82,15 +77,8 @@ class SegmentationNode(PeaceNode):
 
     def _create_segmenter(self) -> Segmenter:
         parameters = self.filled(SegmentationParameters)
-        segmenter = create_segmenter(
-            parameters.family, parameters.bundle, load_terms(parameters.terms), parameters
-        )
-        self.get_logger().info(f'model: {segmenter.footprint}')
-        for term, words in segmenter.unknown_terms.items():
-            self.get_logger().warning(
-                f'term {term!r}: the model has never learned {", ".join(words)} and cannot see it'
-            )
-        return segmenter
+        own = self.filled(family_of(parameters).parameters)
+        return create_segmenter(parameters, own, log=self.get_logger())
 
     def _on_image(self, message: ImageMessage) -> None:
         if self._static is None and self._board.is_empty:
@@ -111,7 +99,7 @@ class SegmentationNode(PeaceNode):
             self._preparer.offer(prompt)
 
     def _prepare(self, prompt: Prompt) -> None:
-        self._segmenter.prepare(prompt)
+        self._pipeline.segmenter.prepare(prompt)
         self._prepared.add(prompt.template)
         self._board.put(prompt)
 
@@ -123,14 +111,13 @@ class SegmentationNode(PeaceNode):
         return None if prompt is None else (prompt, prompt.stamp_ns == at_ns)
 
     def _segment(self, message: ImageMessage) -> None:
-        chosen = self._prompt_for(stamp_ns(message))
+        chosen = self._prompt_for(stamp_ns_of(message))
         if chosen is None:
             return
         prompt, own = chosen
         began = time.monotonic()
         frame = frame_from_message(message)
-        self._camera.check(frame)
-        heatmap = self._segmenter.segment(frame, prompt)
+        heatmap = self._pipeline.heatmap(frame, prompt)
         self._heatmap_out.publish(heatmap_to_image(heatmap, message.header.frame_id))
         work_s = time.monotonic() - began
         if self._overlay_out.get_subscription_count() > 0:

@@ -12,11 +12,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain import ConfigurationError, Pose, Setpoint, VehicleError
 from peace_ros.core.landing import Decision, State
+from peace_ros.core.messages import pose_from_message, pose_from_transform
+from peace_ros.core.node_parameters import LandingOptions
 from peace_ros.core.vehicle import MavlinkLink, VehicleLink, VehicleParameters, open_vehicle
 from peace_ros.nodes.connection import Connection
 from peace_ros.nodes.handover import AfterHandover
-from peace_ros.nodes.messages import pose_from_message, pose_from_transform
-from peace_ros.nodes.options import LandingOptions
 from peace_ros.nodes.qos import COMMAND, POSE_IN
 from peace_ros.nodes.runtime import PeaceNode
 from peace_ros.nodes.twist_link import TwistLink

@@ -22,14 +22,14 @@ def test_words_come_as_they_are_written(tmp_path):
     ('text', 'says'),
     [
         ('good: grass\nbad: []\n', "good: 'grass'; give a list"),
-        ('good: [grass, 3]\nbad: []\n', 'good: 3 is no text; put it in quotes'),
-        ('good: [no]\nbad: []\n', 'good: False is no text'),
+        ('good: [grass, 3]\nbad: []\n', 'good: 3 is not a text; put it in quotes'),
+        ('good: [no]\nbad: []\n', 'good: False is not a text'),
         ('good: [grass]\n', 'has good; give the lists good and bad, each once'),
         ('good: [grass]\nbad: []\nugly: []\n', 'has good, bad, ugly'),
-        ('good: [grass]\nbad: []\nbad: [car]\n', 'has good, bad, bad; .* each once'),
+        ('good: [grass]\nbad: []\nbad: [car]\n', r'bad is there twice \(line 3\).* each once'),
         ('[grass]\n', 'no lists'),
         ('', 'no lists'),
-        ('good: [grass', 'not YAML'),
+        ('good: [grass', 'not usable YAML'),
     ],
 )
 def test_anything_else_is_refused(tmp_path, text, says):
@@ -44,7 +44,7 @@ def test_a_missing_or_binary_file_is_named(tmp_path):
         read_word_lists(tmp_path / 'none.yaml', NAMES)
     binary = tmp_path / 'binary.yaml'
     binary.write_bytes(b'\xff\xfe\x00')
-    with pytest.raises(ConfigurationError, match=r'binary\.yaml: not YAML'):
+    with pytest.raises(ConfigurationError, match=r'binary\.yaml: not usable YAML'):
         read_word_lists(binary, NAMES)
 
 

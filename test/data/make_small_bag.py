@@ -22,7 +22,7 @@ from peace_ros.core.domain.geometry import (
     quaternion_from_euler,
 )
 from peace_ros.recording import TYPESTORE, BagWriter
-from peace_ros.recording.messages import header, jpeg_image, pose_stamped
+from peace_ros.recording.messages import header, jpeg_message, pose_stamped
 from peace_ros.simulation.camera import NadirCamera
 from peace_ros.simulation.world import draw_world
 
@@ -69,7 +69,7 @@ def main() -> None:
                 continue
             picture = view.view(pose).image_rgb
             bag.write(
-                '/image/compressed', pose.stamp_ns, jpeg_image(picture, pose.stamp_ns, quality=85)
+                '/image/compressed', pose.stamp_ns, jpeg_message(picture, pose.stamp_ns, quality=85)
             )
             bag.write('/camera_info', pose.stamp_ns, camera_info(pose.stamp_ns))
 

@@ -16,14 +16,10 @@ pytest.importorskip('transformers')
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image
 
+from peace_ros.core.messages import heatmap_from_image, prompt_from_message, stamp_ns_of
 from peace_ros.lab.benchmark.bundles import build_random
 from peace_ros.nodes import qos
-from peace_ros.nodes.messages import (
-    heatmap_from_image,
-    image_message,
-    prompt_from_message,
-    stamp_ns,
-)
+from peace_ros.nodes.messages import image_message
 from peace_ros.simulation.demo.nodes import MODULES
 from peace_ros.simulation.demo.processes import ProcessGroup, log_tail
 
@@ -62,7 +58,7 @@ def test_one_parameter_changes_the_model_of_a_node(
     heatmap = heatmap_from_image(heatmaps[0])
     assert heatmap.safety.shape == (352, 352)
     assert heatmap.safety.std() > 0.01
-    assert heatmap.stamp_ns >= stamp_ns(prompts[0]) >= 10**9
+    assert heatmap.stamp_ns >= stamp_ns_of(prompts[0]) >= 10**9
     assert len(prompt_from_message(prompts[0]).ranking) >= 3
     for node, bundle in chosen.items():
         assert f'{bundle} fp32 on CPUExecutionProvider' in log_tail(tmp_path / f'{node}.log', 50)

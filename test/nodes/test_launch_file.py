@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 
-from peace_ros.lab.parameter_docs import NODE_PARAMETERS, named
+from peace_ros.core.node_parameters import named
+from peace_ros.lab.parameter_docs import NODE_PARAMETERS
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -85,7 +86,7 @@ def test_given_parameters_exist_and_defaults_are_those_of_the_nodes(description)
     }
     assert (ROOT / 'config' / 'presets' / f'{arguments["preset"]}.yaml').is_file()
     for node in (each.options for each in description if each.kind == 'Node'):
-        known = dict(named(NODE_PARAMETERS[node['executable']]))
+        known = named(NODE_PARAMETERS[node['executable']])
         for parameters in node['parameters']:
             for name in parameters if isinstance(parameters, dict) else ():
                 if name != 'use_sim_time':

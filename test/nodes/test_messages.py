@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CompressedImage, Image
 
+from peace_ros.core import messages as readers
 from peace_ros.core.domain import (
     Camera,
     ConfigurationError,
@@ -37,7 +38,7 @@ def test_a_frame_keeps_pixels_and_stamp_through_dds_bytes():
     pixels = np.random.default_rng(1).integers(0, 256, (7, 5, 3), np.uint8)
     message = messages.image_message(pixels, 'rgb8', STAMP)
     assert isinstance(message.data, array)
-    frame = messages.frame_from_message(deserialize_message(serialize_message(message), Image))
+    frame = readers.frame_from_message(deserialize_message(serialize_message(message), Image))
     np.testing.assert_array_equal(frame.image_rgb, pixels)
     assert frame.stamp_ns == STAMP
 
@@ -45,7 +46,7 @@ def test_a_frame_keeps_pixels_and_stamp_through_dds_bytes():
 def test_a_jpeg_keeps_its_stamp():
     message = messages.jpeg_message(np.full((8, 9, 3), 90, np.uint8), STAMP, 90)
     assert isinstance(message, CompressedImage)
-    frame = messages.frame_from_message(message)
+    frame = readers.frame_from_message(message)
     assert frame.image_rgb.shape == (8, 9, 3)
     assert frame.stamp_ns == STAMP
 
@@ -55,7 +56,7 @@ def test_a_heatmap_comes_back_within_half_a_grey_level(scores):
     heatmap = Heatmap(np.array([scores], np.float32), STAMP)
     message = messages.heatmap_to_image(heatmap)
     assert message.encoding == 'mono8'
-    back = messages.heatmap_from_image(message)
+    back = readers.heatmap_from_image(message)
     assert back.stamp_ns == STAMP
     assert np.abs(back.safety - heatmap.safety).max() <= 0.5 / 255 + 1e-6
 
@@ -69,7 +70,7 @@ def test_what_is_not_a_number_is_never_safe():
 def test_a_heatmap_of_another_encoding_is_refused():
     message = messages.image_message(np.zeros((2, 2, 3), np.uint8), 'rgb8', STAMP)
     with pytest.raises(ImageError, match='mono8'):
-        messages.heatmap_from_image(message)
+        readers.heatmap_from_image(message)
 
 
 def depth_message(depth: np.ndarray, pad: int = 0, order: str = '<f4') -> Image:
@@ -85,7 +86,7 @@ def depth_message(depth: np.ndarray, pad: int = 0, order: str = '<f4') -> Image:
 @pytest.mark.parametrize(('pad', 'order'), [(0, '<f4'), (8, '<f4'), (0, '>f4')])
 def test_a_depth_image_keeps_metres_and_stamp(pad, order):
     depth = np.array([[1.5, 20.0, np.inf], [0.0, np.nan, 3.25]], np.float32)
-    back = messages.depth_from_image(depth_message(depth, pad, order))
+    back = readers.depth_from_image(depth_message(depth, pad, order))
     np.testing.assert_array_equal(back.depth_m, depth)
     assert back.depth_m.dtype == np.float32
     assert back.stamp_ns == STAMP
@@ -95,11 +96,11 @@ def test_a_depth_image_of_millimetres_or_with_bytes_missing_is_refused():
     millimetres = depth_message(np.ones((2, 2), np.float32))
     millimetres.encoding = '16UC1'
     with pytest.raises(ImageError, match='32FC1'):
-        messages.depth_from_image(millimetres)
+        readers.depth_from_image(millimetres)
     cut = depth_message(np.ones((2, 2), np.float32))
     cut.data = cut.data[:8]
     with pytest.raises(ImageError, match='8 bytes came, 16 fit'):
-        messages.depth_from_image(cut)
+        readers.depth_from_image(cut)
 
 
 def test_a_prompt_keeps_template_scores_and_stamp():
@@ -110,20 +111,20 @@ def test_a_prompt_keeps_template_scores_and_stamp():
     prompt = Prompt('A {term} in heat-map.', STAMP, ranking)
     message = messages.prompt_to_message(prompt)
     assert message.status[0].message == prompt.template
-    assert messages.diagnostic_values(message)['best/environment'] == 'heat-map'
-    assert messages.prompt_from_message(message) == prompt
+    assert readers.diagnostic_values(message)['best/environment'] == 'heat-map'
+    assert readers.prompt_from_message(message) == prompt
 
 
 def test_a_message_without_a_template_is_no_prompt():
     empty = messages.diagnostic_array(STAMP, 'prompt', messages.OK, '', ())
     with pytest.raises(ConfigurationError, match='template'):
-        messages.prompt_from_message(empty)
+        readers.prompt_from_message(empty)
 
 
 def test_a_score_that_is_no_number_is_refused():
     pairs = (('template', '{term}'), ('score/frame/image', 'high'))
     with pytest.raises(ConfigurationError, match='high'):
-        messages.prompt_from_message(
+        readers.prompt_from_message(
             messages.diagnostic_array(STAMP, 'prompt', messages.OK, '', pairs)
         )
 
@@ -134,7 +135,7 @@ angles = st.floats(-1.4, 1.4)
 @given(angles, angles, st.floats(-3.0, 3.0), st.floats(-500, 500), st.floats(-500, 500))
 def test_a_pose_comes_back(roll, pitch, yaw, north, east):
     pose = Pose(STAMP, north, east, -42.0, quaternion_from_euler(roll, pitch, yaw), 42.0)
-    back = messages.pose_from_message(messages.pose_to_message(pose))
+    back = readers.pose_from_message(messages.pose_to_message(pose))
     assert (back.stamp_ns, back.north_m, back.east_m) == (STAMP, north, east)
     assert back.altitude_agl_m == pytest.approx(42.0)
     dot = sum(a * b for a, b in zip(back.quaternion_ned_frd, pose.quaternion_ned_frd, strict=True))
@@ -155,22 +156,22 @@ def test_a_pose_that_is_none_is_refused(change):
     message.pose.position.z = float('nan') if change == 'nan' else 10.0
     message.pose.orientation.w = {'nan': 1.0, 'zero': 0.0, 'long': 2.0}[change]
     with pytest.raises(VehicleError, match='quaternion'):
-        messages.pose_from_message(message)
+        readers.pose_from_message(message)
 
 
 def test_a_transform_is_read_as_a_pose():
     pose = Pose(STAMP, 5.0, -6.0, -70.0, quaternion_from_euler(0.1, 0.0, 2.0), 70.0)
     transform = messages.transform_from_pose(pose, 'flying_sensor')
     assert (transform.header.frame_id, transform.child_frame_id) == ('map', 'flying_sensor')
-    assert messages.pose_from_transform(transform).north_m == pytest.approx(5.0)
+    assert readers.pose_from_transform(transform).north_m == pytest.approx(5.0)
 
 
 def test_a_setpoint_is_enu_with_the_stamp_of_its_frame():
     message = messages.setpoint_to_twist_stamped(Setpoint(STAMP, 1.0, 2.0, 3.0), 5)
     linear = message.twist.linear
     assert (linear.x, linear.y, linear.z) == (2.0, 1.0, -3.0)
-    assert messages.stamp_ns(message) == STAMP
-    assert messages.stamp_ns(messages.setpoint_to_twist_stamped(Setpoint(0), 5)) == 5
+    assert readers.stamp_ns_of(message) == STAMP
+    assert readers.stamp_ns_of(messages.setpoint_to_twist_stamped(Setpoint(0), 5)) == 5
 
 
 @pytest.mark.parametrize(

@@ -13,13 +13,13 @@ import yaml
 from rclpy.parameter import Parameter
 
 from peace_ros.core.domain import ConfigurationError
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import check, describe, parameter
+from peace_ros.core.node_parameters import named
 from peace_ros.lab.parameter_docs import (
     NODE_PARAMETERS,
     allowed,
     defaults_yaml,
     markdown,
-    named,
 )
 from peace_ros.nodes.runtime import PeaceNode
 
@@ -78,7 +78,7 @@ def test_no_parameter_can_be_changed_in_flight():
         ({'speed': float('nan')}, ['speed = nan']),
         ({'speed': 'fast'}, ["speed = 'fast'", 'a number', '1.5']),
         ({'count': 0}, ['count = 0', '1']),
-        ({'count': 2.5}, ['count = 2.5', 'whole number']),
+        ({'count': 2.5}, ['count = 2.5', 'an integer']),
         ({'count': True}, ['count = True']),
         ({'name': 'c'}, ["name = 'c'", 'a, b']),
         ({'active': 1}, ['active = 1', 'true or false']),
@@ -93,6 +93,45 @@ def test_a_bad_value_is_refused_in_one_sentence(values, words):
         node_with(**values)
     assert all(word in str(caught.value) for word in words)
     assert '\n' not in str(caught.value)
+
+
+@pytest.fixture
+def node_from(tmp_path, monkeypatch):
+    """Start a node with a parameter file."""
+
+    def start(text: str) -> PeaceNode:
+        path = tmp_path / 'given.yaml'
+        path.write_text(text)
+        arguments = ['--ros-args', '--params-file', str(path)]
+        monkeypatch.setattr('sys.argv', ['sample', *arguments])
+        return PeaceNode('sample', ('', Sample), cli_args=arguments)
+
+    return start
+
+
+WILDCARD = '/**:\n  ros__parameters:\n    count: 7\n'
+OTHERS = 'camera:\n  ros__parameters:\n    sped: 1.0\n'
+
+
+def test_a_section_for_all_nodes_may_hold_what_this_one_does_not_have(node_from):
+    node = node_from(f'{WILDCARD}    robot_description: x\n{OTHERS}')
+    assert node.filled(Sample).count == 7
+    node.destroy_node()
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        (f'{WILDCARD}    sped: 1.0\n', 'sped of section /** is unknown: did you mean speed?'),
+        (f'{WILDCARD}    count: -1\n', 'count is there twice'),
+        (f'{WILDCARD}    x: 1\nsample:\n  ros__parameters: {{x: 2}}\n', 'x of sample is unknown'),
+        ('sample:\n  ros__parameters: {robot_description: x}\n', 'robot_description of sample'),
+    ],
+)
+def test_a_file_with_a_misspelt_parameter_is_refused(node_from, text, words):
+    with pytest.raises(ConfigurationError) as caught:
+        node_from(text)
+    assert words in str(caught.value)
 
 
 def test_parameters_of_ros_itself_are_known():
@@ -112,7 +151,7 @@ def flat(section: dict, prefix: str = '') -> dict:
 
 @pytest.mark.parametrize('node', sorted(NODE_PARAMETERS))
 def test_code_yaml_and_documentation_agree(node):
-    defaults = {name: info.default for name, info in named(NODE_PARAMETERS[node])}
+    defaults = {name: info.default for name, info in named(NODE_PARAMETERS[node]).items()}
     plain = {
         name: list(value) if isinstance(value, tuple) else value for name, value in defaults.items()
     }
@@ -137,13 +176,13 @@ def test_generated_files_are_fresh():
 
 def test_no_name_is_declared_twice_on_a_node():
     for groups in NODE_PARAMETERS.values():
-        names = [name for name, _ in named(groups)]
-        assert len(names) == len(set(names))
+        count = sum(len(describe(each)) for _, each in groups)
+        assert len(named(groups)) == count
 
 
 def test_every_number_has_bounds():
     for node, groups in NODE_PARAMETERS.items():
-        for name, info in named(groups):
+        for name, info in named(groups).items():
             if isinstance(info.default, int | float) and not isinstance(info.default, bool):
                 assert allowed(info), f'{node}.{name}'
 
@@ -155,7 +194,7 @@ def test_presets_are_the_six_of_the_paper_and_their_values_exist():
     }
     for path in PRESETS.glob('*.yaml'):
         for node, section in yaml.safe_load(path.read_text()).items():
-            known = dict(named(NODE_PARAMETERS[node]))
+            known = named(NODE_PARAMETERS[node])
             for name, value in section['ros__parameters'].items():
                 assert type(value) is type(known[name].default), f'{path.name}: {node}.{name}'
             prompt, model = path.stem.split('_')

@@ -8,8 +8,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CompressedImage, Image
 
 from peace_ros.core.domain import Prompt, RankedWord
+from peace_ros.core.messages import prompt_from_message, stamp_ns_of
 from peace_ros.nodes import qos
-from peace_ros.nodes.messages import jpeg_message, prompt_from_message, stamp_ns
+from peace_ros.nodes.messages import jpeg_message
 from peace_ros.nodes.prompt_generator import PromptGeneratorNode
 
 
@@ -36,7 +37,7 @@ def test_takes_compressed_images(bench):
     images = bench.offer(CompressedImage, 'image/compressed', qos.IMAGE_OUT)
     frame = jpeg_message(pixels(), 77, 90)
     bench.until(lambda: bool(prompts), lambda: images.publish(frame))
-    assert stamp_ns(prompts[0]) == 77
+    assert stamp_ns_of(prompts[0]) == 77
 
 
 def pixels():
@@ -58,7 +59,7 @@ def test_a_garbage_image_is_said_and_the_next_one_is_described(bench, picture):
     )
     assert not prompts
     bench.until(lambda: bool(prompts), lambda: images.publish(picture(2)))
-    assert stamp_ns(prompts[0]) == 2
+    assert stamp_ns_of(prompts[0]) == 2
 
 
 def test_a_static_template_needs_no_model(bench, picture):

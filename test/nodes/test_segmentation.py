@@ -12,14 +12,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CompressedImage, Image
 
 from peace_ros.core.domain import Heatmap, Prompt
+from peace_ros.core.messages import frame_from_message, heatmap_from_image, stamp_ns_of
 from peace_ros.nodes import qos
-from peace_ros.nodes.messages import (
-    WARN,
-    frame_from_message,
-    heatmap_from_image,
-    prompt_to_message,
-    stamp_ns,
-)
+from peace_ros.nodes.messages import WARN, prompt_to_message
 from peace_ros.nodes.segmentation import SegmentationNode
 
 
@@ -141,7 +136,7 @@ def test_a_slow_segmenter_loses_frames_and_never_gathers_latency(bench, picture,
     latencies = [float(values_of(each)['latency_s']) for each in diagnostics]
     # Two times the work and some room for a busy machine; a queue of all frames would exceed it.
     assert latencies[-1] < 0.2 * 2 + 0.4
-    stamps = [stamp_ns(each) for each in heatmaps]
+    stamps = [stamp_ns_of(each) for each in heatmaps]
     assert stamps == sorted(stamps)
 
 

@@ -83,6 +83,11 @@ class PromptingParameters:
         check(self)
         resolve_template(self.template)
 
+    @property
+    def is_static(self) -> bool:
+        """The template has no vocabulary words: every frame gets the same prompt."""
+        return not categories_of(resolve_template(self.template))
+
 
 class _Category:
     """The words of one category: their embeddings, smoothed similarities and the ones in use."""
@@ -167,11 +172,6 @@ class PromptGenerator:
             rows = embeddings[start : start + len(words)]
             self._categories[name] = _Category(words, rows, count)
             start += len(words)
-
-    @property
-    def is_static(self) -> bool:
-        """The template has no vocabulary words: every frame gets the same prompt."""
-        return not self._categories
 
     def reset(self) -> None:
         """Forget the frames so far; the next one is ranked on its own."""

@@ -5,16 +5,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
-from peace_ros.core.inference import Bundle, Preprocessor
+from peace_ros.core.domain import ConfigurationError, Frame, Heatmap, Prompt
+from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.inference import Preprocessor
 from peace_ros.core.inference.contract import IS_POSITIVE, PIXEL_VALUES, TERM_LOGITS, TEXT_EMBEDDING
 from peace_ros.core.segmentation.fusion import calibrated
 from peace_ros.core.segmentation.looks import joined, parts_of
-from peace_ros.core.segmentation.segmenter import BundleSegmenter, SegmentationParameters
+from peace_ros.core.segmentation.segmenter import (
+    BundleOrName,
+    BundleSegmenter,
+    SegmentationParameters,
+)
 from peace_ros.core.segmentation.terms import Terms
 
 Image = NDArray[np.uint8]
@@ -24,16 +30,43 @@ _ROUNDING = 1e-3
 """How far beyond 0 and 1 a score may lie, from arithmetic in fp16 or int8."""
 
 
+@dataclass(frozen=True)
+class ClipSegParameters:
+    """Parameters of the family clipseg."""
+
+    clipseg_max_looks: int = parameter(
+        10,
+        'Family clipseg: a frame of more pixels than the network takes is seen whole and closer in '
+        'parts, in this many looks at most; each takes as long as a small frame. 1: whole only',
+        low=1,
+        high=101,
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
 class ClipSegSegmenter(BundleSegmenter):
     """A Segmenter over a bundle of the family ``clipseg``."""
 
-    def __init__(self, bundle: Bundle, terms: Terms, parameters: SegmentationParameters) -> None:
+    FAMILY = 'clipseg'
+    ROLES = ('image_encoder', 'text_encoder', 'decoder')
+    MEASURED_WITH = 'set_difference'
+
+    def __init__(
+        self,
+        bundle: BundleOrName,
+        terms: Terms,
+        parameters: SegmentationParameters,
+        own: ClipSegParameters | None = None,
+    ) -> None:
         """Open the bundle's graphs and run them once.
 
         Args:
             bundle: of the family ``clipseg``.
             terms: what to look for.
             parameters: of the segmentation; its bundle and terms are those given here.
+            own: of the family; None: as they are declared.
 
         Raises:
             BundleError: the bundle is of another family or its graphs do not fit it.
@@ -45,23 +78,22 @@ class ClipSegSegmenter(BundleSegmenter):
                 'fusion softmax without negative terms would call everything safe: '
                 'name negative terms or choose set_difference'
             )
-        bundle.require_family('clipseg')
-        self._threshold = _threshold(bundle, parameters.fusion)
-        super().__init__(bundle, ('image_encoder', 'text_encoder', 'decoder'), terms, parameters)
-        self._preprocess = Preprocessor(bundle.manifest.input)
+        super().__init__(bundle, terms, parameters)
+        self._max_looks = (own or ClipSegParameters()).clipseg_max_looks
+        self._preprocess = Preprocessor(self._manifest.input)
         self._features = [each.name for each in self._sessions['image_encoder'].graph.outputs]
         self._is_positive = np.array(
             [1.0] * len(terms.positive) + [0.0] * len(terms.negative), np.float32
         )
-        self._warm_up(bundle)
+        self._warm_up()
         self._loaded()
 
-    def _warm_up(self, bundle: Bundle) -> None:
-        size = bundle.manifest.input
+    def _warm_up(self) -> None:
+        size = self._manifest.input
         blank = np.zeros((size.height, size.width, 3), np.uint8)
         encoder = self._sessions['image_encoder']
         features = encoder.warm_up(self._features, {PIXEL_VALUES: self._preprocess(blank)})
-        texts = np.zeros((len(self._terms), bundle.manifest.embedding_width), np.float32)
+        texts = np.zeros((len(self.terms), self._manifest.embedding_width), np.float32)
         self._sessions['decoder'].warm_up(self._fusion.outputs, self._feeds(features, texts))
 
     def segment(self, frame: Frame, prompt: Prompt) -> Heatmap:
@@ -89,7 +121,7 @@ class ClipSegSegmenter(BundleSegmenter):
         parts = parts_of(
             (image.shape[1], image.shape[0]),
             (size.width, size.height),
-            self._parameters.clipseg_max_looks,
+            self._max_looks,
         )
         whole = see(image)
         answers = [see(part.of(image)) for part in parts]
@@ -104,7 +136,7 @@ class ClipSegSegmenter(BundleSegmenter):
 
     def _chances(self, image_rgb: Image, texts: Scores) -> list[Scores]:
         (logits,) = self._decode(image_rgb, texts, [TERM_LOGITS])
-        if logits.ndim != 3 or logits.shape[0] != len(self._terms):
+        if logits.ndim != 3 or logits.shape[0] != len(self.terms):
             raise self._unusable('decoder', f'{TERM_LOGITS} of shape {logits.shape}')
         if not np.isfinite(logits).all():
             raise self._unusable('decoder', f'{TERM_LOGITS} that are not finite')
@@ -132,16 +164,3 @@ class ClipSegSegmenter(BundleSegmenter):
         if not (low >= -_ROUNDING and high <= 1.0 + _ROUNDING):
             raise self._unusable('decoder', f'scores from {low} to {high} where 0 to 1 is due')
         return np.clip(scores, np.float32(0.0), np.float32(1.0))
-
-
-def _threshold(bundle: Bundle, fusion: str) -> float:
-    """Return the bundle's recommendation, which was measured with the set difference."""
-    if fusion != 'set_difference':
-        return 0.5
-    threshold = float(bundle.manifest.recommended.get('threshold', 0.5))
-    if not 0.0 < threshold < 1.0:
-        raise BundleError(
-            f'{bundle.folder / "manifest.json"}: recommended threshold {threshold} must lie '
-            'between 0 and 1, both excluded: correct the manifest or export the bundle anew'
-        )
-    return threshold

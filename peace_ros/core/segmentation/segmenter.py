@@ -1,32 +1,33 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What every open-vocabulary segmenter can do, what those over a bundle share, parameters."""
+"""What every open-vocabulary segmenter can do, and what those over a bundle share."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import BundleError, Frame, Heatmap, Prompt
+from peace_ros.core.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
 from peace_ros.core.domain.parameters import check, parameter
 from peace_ros.core.inference import Bundle, TextEncoder, open_sessions
 from peace_ros.core.inference.providers import Footprint, LoadMeter
 from peace_ros.core.segmentation.fusion import FUSIONS
 from peace_ros.core.segmentation.terms import Terms
 
-FAMILIES = ('clipseg', 'fastsam')
+BundleOrName = Bundle | Path | str
+"""A bundle that is loaded, or the folder or name of one."""
 
 
 @dataclass(frozen=True)
 class SegmentationParameters:
-    """Parameters of the segmentation."""
+    """Parameters of the segmentation, whatever the family of its model."""
 
-    family: str = parameter('clipseg', 'Family of the segmentation model', choices=FAMILIES)
+    family: str = parameter('clipseg', 'Family of the segmentation model: clipseg or fastsam')
     bundle: str = parameter(
         'clipseg-small', 'Model bundle of that family: a folder or the name of a shipped one'
     )
@@ -46,80 +47,43 @@ class SegmentationParameters:
     cache_dir: str = parameter(
         '', 'Folder that keeps text embeddings for the next start; empty keeps them in memory only'
     )
-    clipseg_max_looks: int = parameter(
-        10,
-        'Family clipseg: a frame of more pixels than the network takes is seen whole and closer in '
-        'parts, in this many looks at most; each takes as long as a small frame. 1: whole only',
-        low=1,
-        high=101,
-    )
-    fastsam_max_segments: int = parameter(
-        50,
-        'Family fastsam: segments that CLIP scores per frame, the largest ones; the ground under '
-        'the others counts as unknown',
-        low=1,
-        high=300,
-    )
-    fastsam_min_confidence: float = parameter(
-        0.4, 'Family fastsam: less sure segments do not count', low=0.0, high=1.0
-    )
-    fastsam_max_overlap: float = parameter(
-        0.9,
-        'Family fastsam: of two boxes with a larger intersection over union the less sure one goes',
-        low=0.0,
-        high=1.0,
-    )
-    fastsam_min_area: float = parameter(
-        0.0005,
-        'Family fastsam: share of the frame below which a segment is too small to be scored; its '
-        'ground counts as unknown',
-        low=0.0,
-        high=1.0,
-    )
-    fastsam_min_stability: float = parameter(
-        0.5,
-        "Family fastsam: a segment whose area shrinks below this share of itself when the mask's "
-        'logit moves from 1 below to 1 above its border is noise and does not count',
-        low=0.0,
-        high=1.0,
-    )
-    fastsam_overlap: str = parameter(
-        'least_safe',
-        'Family fastsam: which segment speaks for a pixel that several cover, the least_safe or '
-        'the smallest one',
-        choices=('least_safe', 'smallest'),
-    )
 
     def __post_init__(self) -> None:
         check(self)
 
 
 class Segmenter(Protocol):
-    """Frame + Prompt -> Heatmap."""
+    """Frame + Prompt -> Heatmap; whoever inherits from it needs :attr:`terms` and :meth:`segment`.
 
-    @property
-    def terms(self) -> Terms:
-        """What it looks for."""
-        ...
+    Models of a family are made with (bundle, terms, parameters, parameters of the family); see
+    ``registry.py``.
+    """
+
+    terms: Terms
+    """What it looks for."""
 
     @property
     def unknown_terms(self) -> Mapping[str, tuple[str, ...]]:
         """Term -> its words that the model has never learned; it cannot see those."""
-        ...
+        return {}
 
     @property
     def calls(self) -> Mapping[str, int]:
         """Role of a network -> how often it ran, without warm-ups."""
-        ...
+        return {}
 
     @property
-    def footprint(self) -> Footprint:
-        """What its networks run on and take."""
-        ...
+    def footprint(self) -> Footprint | str:
+        """What its networks run on and take, to be printed."""
+        return type(self).__name__
+
+    @property
+    def threshold(self) -> float:
+        """The network's own score that stands at one half of the heatmap, between 0 and 1."""
+        return 0.5
 
     def prepare(self, prompt: Prompt) -> None:
         """Embed the prompt's texts ahead of the frame; may be called from another thread."""
-        ...
 
     def segment(self, frame: Frame, prompt: Prompt) -> Heatmap:
         """Return the safety of each pixel, with the frame's stamp.
@@ -129,38 +93,55 @@ class Segmenter(Protocol):
         """
         ...
 
-    def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
+    def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:  # noqa: ARG002
         """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``."""
-        ...
+        raise ConfigurationError(
+            f'{type(self).__name__} does not score each term by itself: choose another family'
+        )
 
 
-class BundleSegmenter:
+class BundleSegmenter(Segmenter):
     """What the segmenters over a bundle share: networks, texts and the fusion of terms."""
 
+    FAMILY: ClassVar[str]
+    ROLES: ClassVar[tuple[str, ...]]
+    """Of the bundle's networks."""
+    MEASURED_WITH: ClassVar[str]
+    """The fusion for which the threshold that a bundle recommends was measured."""
+
     def __init__(
-        self,
-        bundle: Bundle,
-        roles: tuple[str, ...],
-        terms: Terms,
-        parameters: SegmentationParameters,
+        self, bundle: BundleOrName, terms: Terms, parameters: SegmentationParameters
     ) -> None:
-        """Open the bundle's graphs of these roles; :meth:`_loaded` is due after their first run.
+        """Open the bundle's graphs; :meth:`_loaded` is due after their first run.
 
         Raises:
-            BundleError: the graphs do not fit the bundle.
+            BundleError: the bundle is of another family or its graphs do not fit it.
             ConfigurationError: an execution provider is not available.
         """
+        loaded = bundle if isinstance(bundle, Bundle) else Bundle.load(bundle)
+        loaded.require_family(self.FAMILY)
         self._meter = LoadMeter()
-        self._manifest = bundle.manifest
-        self._terms = terms
+        self._manifest = loaded.manifest
+        self.terms = terms
         self._parameters = parameters
         self._fusion = FUSIONS[parameters.fusion]
+        self._threshold = self._recommended(loaded)
         self._sessions = open_sessions(
-            bundle, roles, threads=parameters.threads, providers=parameters.providers
+            loaded, self.ROLES, threads=parameters.threads, providers=parameters.providers
         )
         cache_dir = Path(parameters.cache_dir).expanduser() if parameters.cache_dir else None
-        self._text = TextEncoder(bundle, self._sessions['text_encoder'], cache_dir)
-        self._loaded()
+        self._text = TextEncoder(loaded, self._sessions['text_encoder'], cache_dir)
+
+    def _recommended(self, bundle: Bundle) -> float:
+        if self._parameters.fusion != self.MEASURED_WITH:
+            return 0.5
+        threshold = float(bundle.manifest.recommended.get('threshold', 0.5))
+        if not 0.0 < threshold < 1.0:
+            raise BundleError(
+                f'{bundle.folder / "manifest.json"}: recommended threshold {threshold} must lie '
+                'between 0 and 1, both excluded: correct the manifest or export the bundle again'
+            )
+        return threshold
 
     def _loaded(self) -> None:
         """Take stock of what the networks hold by now."""
@@ -173,14 +154,9 @@ class BundleSegmenter:
         )
 
     @property
-    def terms(self) -> Terms:
-        """What it looks for."""
-        return self._terms
-
-    @property
     def unknown_terms(self) -> Mapping[str, tuple[str, ...]]:
         """Term -> its words that the model has never learned; it cannot see those."""
-        return self._text.unknown_words(self._terms.all)
+        return self._text.unknown_words(self.terms.all)
 
     @property
     def calls(self) -> Mapping[str, int]:
@@ -192,12 +168,17 @@ class BundleSegmenter:
         """What its networks run on and take."""
         return self._footprint
 
+    @property
+    def threshold(self) -> float:
+        """What the bundle recommends, where the fusion is the one that it was measured with."""
+        return self._threshold
+
     def prepare(self, prompt: Prompt) -> None:
         """Embed the prompt's texts ahead of the frame; may be called from another thread."""
         self._embeddings(prompt)
 
     def _embeddings(self, prompt: Prompt) -> NDArray[np.float32]:
-        return self._text([prompt.text_for(term) for term in self._terms.all])
+        return self._text([prompt.text_for(term) for term in self.terms.all])
 
     def _unusable(self, role: str, what: str) -> BundleError:
         path = self._sessions[role].graph.path

@@ -32,7 +32,9 @@ from peace_ros.core.inference.contract import (
 )
 from peace_ros.core.prompting import PromptGenerator, PromptingParameters, load_vocabularies
 from peace_ros.core.segmentation import (
+    ClipSegParameters,
     ClipSegSegmenter,
+    FastSamParameters,
     FastSamSegmenter,
     SegmentationParameters,
     Terms,
@@ -67,13 +69,11 @@ class Setup:
         """Return the segmenter; CLIPSeg looks once, as the ways do that it is compared with."""
         bundle = Bundle.load(self.bundle)
         parameters = SegmentationParameters(
-            family=bundle.manifest.family,
-            threads=self.threads,
-            providers=(self.provider,),
-            clipseg_max_looks=1,
+            family=bundle.manifest.family, threads=self.threads, providers=(self.provider,)
         )
-        kind = FastSamSegmenter if parameters.family == 'fastsam' else ClipSegSegmenter
-        return kind(bundle, terms, parameters)
+        if parameters.family == 'fastsam':
+            return FastSamSegmenter(bundle, terms, parameters)
+        return ClipSegSegmenter(bundle, terms, parameters, ClipSegParameters(1))
 
     def sessions(self, *roles: str) -> tuple[Bundle, list[Session]]:
         """Return the bundle and some of its graphs."""
@@ -229,7 +229,7 @@ def _clipseg_stages(setup: Setup, frames: Sequence[Frame]) -> dict[str, Spread]:
 def _fastsam_stages(setup: Setup, frames: Sequence[Frame]) -> dict[str, Spread]:
     """Time the steps within a segmentation, with its own parts."""
     bundle, (segmenter, encoder) = setup.sessions('segmenter', 'image_encoder')
-    parameters = SegmentationParameters()
+    parameters = FastSamParameters()
     letterbox = Letterbox(bundle.manifest.input)
     cutter = Cutter(bundle.manifest.encoder_input, parameters.fastsam_max_segments)
     watch = Stopwatch()

@@ -29,7 +29,7 @@ from peace_ros.core.inference import Bundle
 from peace_ros.core.inference.tokenizer import Tokenizer
 from peace_ros.core.prompting import load_vocabularies
 from peace_ros.core.prompting.vocabulary import CATEGORIES
-from peace_ros.core.segmentation import SegmentationParameters
+from peace_ros.core.segmentation import FastSamParameters
 from peace_ros.core.segmentation.fastsam import Letterbox, Segment, assemble, detect
 from peace_ros.core.segmentation.fastsam.selection import select
 from peace_ros.lab.benchmark.bundles import SEGMENTS
@@ -140,7 +140,7 @@ class _FastSamReference:
 
     def find(self, frame: Frame) -> tuple[list[Segment], NDArray[np.uint8]]:
         """Return the segments and the frame at their resolution."""
-        parameters = SegmentationParameters()
+        parameters = FastSamParameters()
         pixels, place = self._letterbox(frame.image_rgb)
         predictions, prototypes = self._network(torch.from_numpy(pixels))
         found = detect(

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any, cast
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain import Camera, ConfigurationError, VehicleError
+from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.core.resources import models_dir
 from peace_ros.lab.faults import line, tamper
 from peace_ros.lab.faults.line import Stranger
 from peace_ros.lab.faults.node import HEATMAP, IMAGE, PROMPT
 from peace_ros.lab.faults.tamper import Tamper
 from peace_ros.lab.faults.walker import Walker
-from peace_ros.nodes.options import CameraOptions
 
 if TYPE_CHECKING:
     from peace_ros.lab.faults.bench import FlightBench

@@ -19,15 +19,11 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Float64, String
 
 from peace_ros.core.domain import Pose
+from peace_ros.core.messages import diagnostic_values, ns_from_time, pose_from_message
 from peace_ros.lab.faults.record import Said, TruthSample
 from peace_ros.lab.faults.tamper import Tamper, untouched
 from peace_ros.nodes import qos
-from peace_ros.nodes.messages import (
-    diagnostic_values,
-    ns_from_time,
-    pose_from_message,
-    time_from_ns,
-)
+from peace_ros.nodes.messages import time_from_ns
 from peace_ros.simulation.demo.listener import Listener
 
 IMAGE, HEATMAP, PROMPT = 'image', 'heatmap', 'prompt'

@@ -11,6 +11,7 @@ from typing import TypeVar
 
 from peace_ros.core.domain import PeaceError
 from peace_ros.core.landing import LandingParameters, State
+from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.lab.faults.bench import ENGAGE_S, FlightBench
 from peace_ros.lab.faults.fault import ABSENT, LEAD_BELOW_M, Fault, Moment
 from peace_ros.lab.faults.record import (
@@ -23,7 +24,6 @@ from peace_ros.lab.faults.record import (
     longest_gap_s,
 )
 from peace_ros.lab.faults.walker import Walker
-from peace_ros.nodes.options import CameraOptions
 from peace_ros.simulation.camera import NadirCamera
 from peace_ros.simulation.demo.truth import judge as judge_ground
 

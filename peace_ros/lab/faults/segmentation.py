@@ -10,46 +10,24 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from std_msgs.msg import String
 
 from peace_ros.core.domain import BundleError, Frame, Heatmap, Prompt
 from peace_ros.core.segmentation import Segmenter
-from peace_ros.core.segmentation.terms import Terms
 from peace_ros.nodes.qos import RESULT
 from peace_ros.nodes.runtime import run
 from peace_ros.nodes.segmentation import SegmentationNode
 
 
-class FailingSegmenter:
+class FailingSegmenter(Segmenter):
     """A real segmenter behind a fault."""
 
     def __init__(self, real: Segmenter) -> None:
         self._real = real
+        self.terms = real.terms
         self.fault = ''
-
-    def __getattr__(self, name: str) -> Any:
-        """Be the real one in everything else."""
-        return getattr(self._real, name)
-
-    @property
-    def terms(self) -> Terms:
-        """What it looks for."""
-        return self._real.terms
-
-    @property
-    def unknown_terms(self) -> Mapping[str, tuple[str, ...]]:
-        """What it cannot see."""
-        return self._real.unknown_terms
-
-    @property
-    def calls(self) -> Mapping[str, int]:
-        """How often the networks ran."""
-        return self._real.calls
 
     def prepare(self, prompt: Prompt) -> None:
         """Embed the texts."""
@@ -65,10 +43,6 @@ class FailingSegmenter:
         elif kind == 'breaks':
             raise RuntimeError('a defect, as the fault matrix asked')
         return self._real.segment(frame, prompt)
-
-    def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
-        """Return one map per term."""
-        return self._real.term_maps(frame, prompt)
 
 
 class FailingSegmentationNode(SegmentationNode):

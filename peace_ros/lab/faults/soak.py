@@ -18,12 +18,12 @@ from rich.console import Console
 
 from peace_ros.core.domain import PeaceError, VehicleError
 from peace_ros.core.landing import State
+from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.lab.faults import report, worlds
 from peace_ros.lab.faults.bench import ENGAGE_S, FlightBench
 from peace_ros.lab.faults.fault import FlightSetting
 from peace_ros.lab.faults.node import BenchNode
 from peace_ros.lab.faults.scenario import unsafe_ground
-from peace_ros.nodes.options import CameraOptions
 from peace_ros.simulation.camera import NadirCamera
 from peace_ros.simulation.demo.isolation import isolate
 

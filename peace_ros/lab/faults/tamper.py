@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import Camera, Pose
+from peace_ros.core.messages import NANOSECONDS, stamp_ns_of
 from peace_ros.lab.faults.walker import Walker
-from peace_ros.nodes.messages import NANOSECONDS, image_message, stamp_ns, time_from_ns
+from peace_ros.nodes.messages import image_message, time_from_ns
 
 Late = tuple[float, Any]
 """Seconds by which a message is held back, and the message."""
@@ -59,7 +60,7 @@ def frozen(*, new_stamps: bool) -> Tamper:
         if not kept:
             kept.append(message)
         first = kept[0]
-        at_ns = stamp_ns(message) if new_stamps else stamp_ns(first)
+        at_ns = stamp_ns_of(message) if new_stamps else stamp_ns_of(first)
         return ((0.0, _with(first, first.data, at_ns)),)
 
     return tamper
@@ -123,7 +124,9 @@ def resized(width_px: int, height_px: int) -> Tamper:
         window = np.ascontiguousarray(pixels[top : top + height, left : left + width])
         small = np.asarray(cv2.resize(window, (width_px, height_px)), np.uint8)
         header = message.header
-        return ((0.0, image_message(small, message.encoding, stamp_ns(message), header.frame_id)),)
+        return (
+            (0.0, image_message(small, message.encoding, stamp_ns_of(message), header.frame_id)),
+        )
 
     return tamper
 
@@ -133,7 +136,7 @@ def shifted(seconds: float) -> Tamper:
     shift_ns = round(seconds * NANOSECONDS)
 
     def tamper(message: Any) -> Iterable[Late]:
-        at_ns = max(0, stamp_ns(message) + shift_ns)
+        at_ns = max(0, stamp_ns_of(message) + shift_ns)
         return ((0.0, _with(message, message.data, at_ns)),)
 
     return tamper
@@ -144,7 +147,7 @@ def equal_stamps() -> Tamper:
     first_ns: list[int] = []
 
     def tamper(message: Any) -> Iterable[Late]:
-        first_ns.append(stamp_ns(message))
+        first_ns.append(stamp_ns_of(message))
         return ((0.0, _with(message, message.data, first_ns[0])),)
 
     return tamper
@@ -155,7 +158,7 @@ def running_back() -> Tamper:
     first_ns: list[int] = []
 
     def tamper(message: Any) -> Iterable[Late]:
-        first_ns.append(stamp_ns(message))
+        first_ns.append(stamp_ns_of(message))
         return ((0.0, _with(message, message.data, 2 * first_ns[0] - first_ns[-1])),)
 
     return tamper
@@ -165,7 +168,7 @@ def with_walker(walker: Walker, camera: Camera, pose_at: Callable[[int], Pose | 
     """Paint a person who walks over the ground into the camera's picture."""
 
     def tamper(message: Any) -> Iterable[Late]:
-        at_ns = stamp_ns(message)
+        at_ns = stamp_ns_of(message)
         pose = pose_at(at_ns)
         if pose is None:
             return ((0.0, message),)
@@ -181,7 +184,7 @@ def with_walker_seen(
     """Let the heatmap call the ground around a walking person unsafe, as a good model would."""
 
     def tamper(message: Any) -> Iterable[Late]:
-        at_ns = stamp_ns(message)
+        at_ns = stamp_ns_of(message)
         pose = pose_at(at_ns)
         if pose is None:
             return ((0.0, message),)

@@ -21,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import PeaceError, RecordingError
+from peace_ros.core.pipeline import SegmentedFrame
 from peace_ros.core.presets import DEFAULT_PRESET
-from peace_ros.lab.replay.line import ReplayedFrame, Step
+from peace_ros.lab.replay.line import Step
 from peace_ros.lab.replay.report import SAFE_FROM
 from peace_ros.lab.replay.run import Replayer
 from peace_ros.lab.replay.source import SourceOptions, open_source
@@ -94,7 +95,7 @@ class Reference:
 def take_reference(recording: Path, config: str = DEFAULT_PRESET) -> Reference:
     """Replay a recording and keep what is compared."""
     replayer = Replayer(open_source(recording, SourceOptions()), config)
-    looks: list[ReplayedFrame] = []
+    looks: list[SegmentedFrame] = []
     names: list[str] = []
     for each in replayer.events():
         if isinstance(each, Step):

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The three cores in one thread, in the order of the stamps: same recording, same answer."""
+"""All cores in one thread, in the order of the stamps: same recording, same answer."""
 
 from __future__ import annotations
 
@@ -9,23 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from peace_ros.core.domain import Camera, Frame, Heatmap, Pose, Prompt, Telemetry
-from peace_ros.core.inference import Bundle, ClipEncoder
-from peace_ros.core.landing import Decision, LandingCore, LandingParameters
-from peace_ros.core.mapping import MapParameters
-from peace_ros.core.prompting import (
-    PromptGenerator,
-    PromptingParameters,
-    categories_of,
-    load_vocabularies,
-    resolve_template,
-)
-from peace_ros.core.segmentation import (
-    SegmentationParameters,
-    Segmenter,
-    create_segmenter,
-    load_terms,
-)
+from peace_ros.core.domain import Camera, Frame, Pose, Telemetry
+from peace_ros.core.landing import Decision
+from peace_ros.core.pipeline import Pipeline, SegmentedFrame, create_landing
 
 if TYPE_CHECKING:
     from peace_ros.core.presets import Preset
@@ -34,15 +20,6 @@ STEP_NS = 100_000_000
 """The landing core decides at 10 Hz of recorded time."""
 _VELOCITY_SPAN_NS = 200_000_000
 _MODE = 'REPLAY'
-
-
-@dataclass(frozen=True)
-class ReplayedFrame:
-    """What the line made of one frame."""
-
-    frame: Frame
-    prompt: Prompt
-    heatmap: Heatmap
 
 
 @dataclass(frozen=True)
@@ -56,7 +33,7 @@ class Step:
 
 
 class ReplayLine:
-    """Prompt generator, segmenter and landing core over recorded frames and poses.
+    """The pipeline and the landing core over recorded frames and poses.
 
     The vehicle is taken to be armed and obedient all the time; its poses are the recorded ones,
     so what the landing core commands has no effect.
@@ -84,13 +61,8 @@ class ReplayLine:
             PeaceError: parameters, terms, vocabularies or bundles cannot be used.
 
         """
-        self.generator = _create_generator(preset, threads)
-        self.segmenter = _create_segmenter(preset, threads)
-        self.landing = LandingCore(
-            preset.fill('landing', LandingParameters),
-            camera,
-            preset.fill('landing', MapParameters),
-        )
+        self.pipeline = Pipeline.from_preset(preset, threads=threads)
+        self.landing = create_landing(preset, camera)
         self._poses = poses
         self._stamps = [pose.stamp_ns for pose in poses]
         self._fed = 0
@@ -98,13 +70,17 @@ class ReplayLine:
         self._engaged = False
         self._now_ns: int | None = None
 
-    def look(self, frame: Frame) -> ReplayedFrame:
-        """Run the networks on a frame and give the heatmap to the landing core."""
-        prompt = self.generator.generate(frame)
-        heatmap = self.segmenter.segment(frame, prompt)
+    def look(self, frame: Frame) -> SegmentedFrame:
+        """Run the networks on a frame and give the heatmap to the landing core.
+
+        Raises:
+            PeaceError: there is no heatmap of this frame, nor would there be in flight.
+
+        """
+        look = self.pipeline.look(frame)
         self._feed_poses(frame.stamp_ns)
-        self.landing.add_heatmap(heatmap)
-        return ReplayedFrame(frame, prompt, heatmap)
+        self.landing.add_heatmap(look.heatmap)
+        return look
 
     def steps_until(self, stamp_ns: int) -> Iterator[Step]:
         """Yield the decisions that fall due up to a stamp."""
@@ -156,19 +132,3 @@ class ReplayLine:
             mode=_MODE,
             landed=False,
         )
-
-
-def _create_generator(preset: Preset, threads: int) -> PromptGenerator:
-    parameters = preset.fill('prompt_generator', PromptingParameters, threads=threads)
-    if not categories_of(resolve_template(parameters.template)):
-        return PromptGenerator(None, None, parameters)
-    encoder = ClipEncoder(
-        Bundle.load(parameters.bundle), threads=threads, providers=parameters.providers
-    )
-    return PromptGenerator(encoder, load_vocabularies(parameters.vocabularies), parameters)
-
-
-def _create_segmenter(preset: Preset, threads: int) -> Segmenter:
-    parameters = preset.fill('segmentation', SegmentationParameters, threads=threads)
-    terms = load_terms(parameters.terms)
-    return create_segmenter(parameters.family, parameters.bundle, terms, parameters)

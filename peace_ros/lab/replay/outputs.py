@@ -8,22 +8,22 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from peace_ros.core.landing.pairs import decision_pairs
 from peace_ros.core.prompting.pairs import prompt_pairs
 from peace_ros.core.segmentation import draw_overlay
 from peace_ros.recording import BagWriter, VideoWriter, canvas, save_picture
 from peace_ros.recording.contact_sheet import Cell, draw_contact_sheet
-from peace_ros.recording.messages import diagnostic_array, jpeg_image, mono8_image
+from peace_ros.recording.messages import diagnostic_array, heatmap_to_image, jpeg_message
 
 if TYPE_CHECKING:
     from types import TracebackType
 
+    import numpy as np
     from numpy.typing import NDArray
     from typing_extensions import Self
 
-    from peace_ros.lab.replay.line import ReplayedFrame, Step
+    from peace_ros.core.pipeline import SegmentedFrame
+    from peace_ros.lab.replay.line import Step
 
 _CELLS = 20
 _OK, _WARN = 0, 1
@@ -72,16 +72,15 @@ class ReplayOutputs:
             sheet = draw_contact_sheet(self._cells, self._title)
             save_picture(sheet, self._folder / 'overlays.png')
 
-    def add_look(self, look: ReplayedFrame, step: Step | None) -> None:
+    def add_look(self, look: SegmentedFrame, step: Step | None) -> None:
         """Write prompt, heatmap and overlay of a frame; ``step`` is the newest decision."""
         stamp_ns = look.frame.stamp_ns
-        values = prompt_pairs(look.prompt)
+        values = prompt_pairs(look.prompt).items()
         message = diagnostic_array(stamp_ns, 'prompt', _OK, look.prompt.template, values)
         self._bag.write('/prompt', stamp_ns, message)
-        levels = np.rint(look.heatmap.safety * 255.0).astype(np.uint8)
-        self._bag.write('/heatmap', stamp_ns, mono8_image(levels, stamp_ns))
+        self._bag.write('/heatmap', stamp_ns, heatmap_to_image(look.heatmap))
         overlay = draw_overlay(look.frame, look.heatmap)
-        self._bag.write('/overlay/compressed', stamp_ns, jpeg_image(overlay, stamp_ns))
+        self._bag.write('/overlay/compressed', stamp_ns, jpeg_message(overlay, stamp_ns))
         caption = _caption(step)
         if self._looks % self._every == 0 and len(self._cells) < _CELLS:
             self._cells.append(Cell(overlay, caption, look.prompt.template))
@@ -93,9 +92,8 @@ class ReplayOutputs:
         """Write a decision as ``landing/status``."""
         decision = step.decision
         level = _WARN if decision.state.value in _QUIET_STATES else _OK
-        message = diagnostic_array(
-            step.stamp_ns, 'landing', level, decision.reason, decision_pairs(decision, step.pose)
-        )
+        pairs = decision_pairs(decision, step.pose).items()
+        message = diagnostic_array(step.stamp_ns, 'landing', level, decision.reason, pairs)
         self._bag.write('/landing/status', step.stamp_ns, message)
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from peace_ros.core.domain import RecordingError
 
 if TYPE_CHECKING:
-    from peace_ros.lab.replay.line import ReplayedFrame, Step
-    from peace_ros.lab.replay.source import Taken
+    from peace_ros.core.pipeline import SegmentedFrame
+    from peace_ros.lab.replay.line import Step
 
 SAFE_FROM = 0.5
 """Heatmap value from which the counts call a pixel safe."""
@@ -97,12 +97,12 @@ class ReportBuilder:
         self._span_ns: tuple[int, int] | None = None
         self._state_since_ns = 0
 
-    def add_fault(self, taken: Taken) -> None:
-        """Count a frame that could not be used."""
+    def add_fault(self, fault: str) -> None:
+        """Count a frame that could not be used, and keep the first reason."""
         self.report.unusable_frames += 1
-        self.report.first_fault = self.report.first_fault or taken.fault
+        self.report.first_fault = self.report.first_fault or fault
 
-    def add_look(self, look: ReplayedFrame) -> None:
+    def add_look(self, look: SegmentedFrame) -> None:
         """Count a heatmap."""
         report, stamp_ns = self.report, look.frame.stamp_ns
         report.frames += 1

@@ -10,9 +10,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from peace_ros.core.domain import Camera, RecordingError
+from peace_ros.core.domain import Camera, PeaceError, RecordingError
+from peace_ros.core.pipeline import SegmentedFrame
 from peace_ros.core.presets import DEFAULT_PRESET, load_preset
-from peace_ros.lab.replay.line import ReplayedFrame, ReplayLine, Step
+from peace_ros.lab.replay.line import ReplayLine, Step
 from peace_ros.lab.replay.outputs import ReplayOutputs
 from peace_ros.lab.replay.report import ReplayReport, ReportBuilder
 from peace_ros.lab.replay.source import (
@@ -103,7 +104,7 @@ class Replayer:
         """What has been found so far."""
         return self._builder.report
 
-    def events(self) -> Iterator[ReplayedFrame | Step]:
+    def events(self) -> Iterator[SegmentedFrame | Step]:
         """Yield looks and decisions in the order of their stamps.
 
         Raises:
@@ -116,7 +117,7 @@ class Replayer:
         last_ns = 0
         for taken in frames:
             if taken.frame is None:
-                self._builder.add_fault(taken)
+                self._builder.add_fault(taken.fault)
                 continue
             if line is None:
                 line = self._line(taken)
@@ -124,7 +125,11 @@ class Replayer:
             for step in line.steps_until(taken.stamp_ns):
                 self._builder.add_step(step)
                 yield step
-            look = line.look(taken.frame)
+            try:
+                look = line.look(taken.frame)
+            except PeaceError as error:
+                self._builder.add_fault(str(error))
+                continue
             self._builder.add_look(look)
             self.report.elapsed_s = time.monotonic() - began
             yield look

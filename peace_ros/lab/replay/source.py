@@ -10,17 +10,15 @@ from math import radians
 from pathlib import Path
 from typing import Protocol
 
-from peace_ros.core.domain import Frame, ImageError, Pose, RecordingError
-from peace_ros.recording import AltitudeProfile, BagReader, VideoReader
-from peace_ros.recording.messages import (
-    IMAGE_TYPES,
-    POSE_TYPES,
+from peace_ros.core.domain import Frame, ImageError, Pose, RecordingError, VehicleError
+from peace_ros.core.messages import (
     diagnostic_values,
-    fov_x_rad_of,
     frame_from_message,
     pose_from_message,
     stamp_ns_of,
 )
+from peace_ros.recording import AltitudeProfile, BagReader, VideoReader
+from peace_ros.recording.messages import IMAGE_TYPES, POSE_TYPES, fov_x_rad_of
 from peace_ros.recording.video import VIDEO_SUFFIXES
 
 DEFAULT_FOV_DEG = 73.0
@@ -224,7 +222,10 @@ def _choose(
 
 
 def _poses(bag: BagReader, topic: str) -> list[Pose]:
-    poses = [pose_from_message(message) for _, _, message in bag.messages([topic])]
+    try:
+        poses = [pose_from_message(message) for _, _, message in bag.messages([topic])]
+    except VehicleError as error:
+        raise RecordingError(f'bag {bag.path}: {error}') from error
     poses.sort(key=lambda pose: pose.stamp_ns)
     return [
         pose

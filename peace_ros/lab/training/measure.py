@@ -13,13 +13,9 @@ import numpy as np
 
 from peace_ros.core.domain import Frame, Label, Prompt, is_safe
 from peace_ros.core.inference import Bundle
+from peace_ros.core.pipeline import segmentation_of
 from peace_ros.core.presets import load_preset
-from peace_ros.core.segmentation import (
-    SegmentationParameters,
-    Segmenter,
-    create_segmenter,
-    load_terms,
-)
+from peace_ros.core.segmentation import Segmenter, create_segmenter, load_terms
 from peace_ros.lab.training.arrays import Image, Points
 from peace_ros.lab.training.sources import FRAME_PX, VALIDATION_SEED, load_drawn
 
@@ -56,10 +52,10 @@ def drawn_examples(cache: Path, count: int) -> list[Example]:
 def open_segmenter(folder: Path, preset: str, threads: int = 2) -> Segmenter:
     """Return a bundle ready to run, with the shipped terms and the parameters of a preset."""
     family = Bundle.load(folder).manifest.family
-    parameters = load_preset(preset).fill(
-        'segmentation', SegmentationParameters, bundle=str(folder), threads=threads
+    parameters, own = segmentation_of(
+        load_preset(preset), family=family, bundle=str(folder), threads=threads
     )
-    return create_segmenter(family, str(folder), load_terms(), parameters)
+    return create_segmenter(parameters, own, terms=load_terms())
 
 
 def sweep(

@@ -18,15 +18,15 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from peace_ros.core.domain import Frame, PeaceError, Pose
-from peace_ros.nodes import qos
-from peace_ros.nodes.messages import (
+from peace_ros.core.messages import (
     diagnostic_values,
     frame_from_message,
     heatmap_from_image,
     pose_from_message,
-    stamp_ns,
+    stamp_ns_of,
 )
-from peace_ros.recording.messages import jpeg_image
+from peace_ros.nodes import qos
+from peace_ros.recording.messages import jpeg_message
 from peace_ros.simulation.demo.history import History, Status
 from peace_ros.simulation.demo.listener import Listener
 
@@ -154,7 +154,7 @@ class Monitor(Listener):
         if raw is None:
             return None
         frame = frame_from_message(deserialize_message(raw, Image))
-        self._writer.write(IMAGE_IN_BAG, self._bag_ns(), jpeg_image(frame.image_rgb, at_ns))
+        self._writer.write(IMAGE_IN_BAG, self._bag_ns(), jpeg_message(frame.image_rgb, at_ns))
         return frame
 
     def _on_prompt(self, message: Any) -> None:
@@ -172,7 +172,7 @@ class Monitor(Listener):
 
     def _on_status(self, message: Any) -> None:
         sentence = message.status[0].message if message.status else ''
-        status = Status(stamp_ns(message), diagnostic_values(message), sentence)
+        status = Status(stamp_ns_of(message), diagnostic_values(message), sentence)
         self.history.add_status(status)
         if not self.counts[POSE] and not self.counts[CAMERA_POSE]:
             self._add_reported_pose(status)

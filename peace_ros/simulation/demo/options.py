@@ -10,7 +10,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from peace_ros.core.domain import Camera, ConfigurationError, VehicleError
-from peace_ros.nodes.options import CameraOptions
+from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.recording.run_folder import create_run_folder
 
 DEFAULT_TIMEOUT_S = 330.0

@@ -15,13 +15,11 @@ from geometry_msgs.msg import PoseStamped
 from rosgraph_msgs.msg import Clock
 
 from peace_ros.nodes.messages import pose_to_message, time_from_ns
-from peace_ros.nodes.parameters import Group
 from peace_ros.nodes.qos import CLOCK, POSE
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
-from peace_ros.simulation.nodes.options import AutopilotSimOptions
+from peace_ros.simulation.nodes.options import AUTOPILOT_SIM, AutopilotSimOptions
 
-PARAMETERS: tuple[Group, ...] = (('', AutopilotParameters), ('', AutopilotSimOptions))
 _CLOCK_PERIOD_S = 0.006
 """Wall time between two messages on /clock, at least."""
 
@@ -36,7 +34,7 @@ class AutopilotSimNode(PeaceNode):
             PeaceError: parameters cannot be used or the port is taken.
 
         """
-        super().__init__('autopilot_sim', *PARAMETERS, **options)
+        super().__init__('autopilot_sim', *AUTOPILOT_SIM, **options)
         parameters = self.filled(AutopilotParameters)
         chosen = self.filled(AutopilotSimOptions)
         self._sim = AutopilotSim(parameters)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.node_parameters import CameraOptions, Group
+from peace_ros.simulation.autopilot import AutopilotParameters
 
 
 @dataclass(frozen=True)
@@ -89,3 +91,9 @@ class AutopilotSimOptions:
 
     def __post_init__(self) -> None:
         check(self)
+
+
+SATELLITE_VIEW: tuple[Group, ...] = (('', SatelliteViewOptions), ('', CameraOptions))
+"""The parameters of the satellite_view node."""
+AUTOPILOT_SIM: tuple[Group, ...] = (('', AutopilotParameters), ('', AutopilotSimOptions))
+"""The parameters of the autopilot_sim node."""

@@ -14,14 +14,10 @@ from geometry_msgs.msg import PoseStamped, Twist
 from rclpy.clock import Clock, ClockType
 
 from peace_ros.core.domain import Pose, VehicleError
+from peace_ros.core.messages import pose_from_message
 from peace_ros.core.vehicle import MavlinkLink, VehicleParameters, open_vehicle
 from peace_ros.nodes.connection import Connection
-from peace_ros.nodes.messages import (
-    BODY_FRAME,
-    pose_from_message,
-    pose_to_message,
-    transform_from_pose,
-)
+from peace_ros.nodes.messages import BODY_FRAME, pose_to_message, transform_from_pose
 from peace_ros.nodes.qos import COMMAND, POSE, POSE_IN
 from peace_ros.nodes.runtime import PeaceNode
 from peace_ros.simulation.nodes.twist_vehicle import TwistVehicle

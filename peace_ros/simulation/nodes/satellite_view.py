@@ -12,14 +12,13 @@ from typing import Any
 from sensor_msgs.msg import CameraInfo, Image
 
 from peace_ros.core.domain import PeaceError, Pose
+from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.nodes.messages import camera_info, image_message
-from peace_ros.nodes.options import CameraOptions
-from peace_ros.nodes.parameters import Group
 from peace_ros.nodes.qos import IMAGE_OUT, RESULT
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.worker import NewestWorker
 from peace_ros.simulation.camera import NadirCamera
-from peace_ros.simulation.nodes.options import SatelliteViewOptions
+from peace_ros.simulation.nodes.options import SATELLITE_VIEW, SatelliteViewOptions
 from peace_ros.simulation.nodes.pose_sources import (
     MavlinkSource,
     PoseSource,
@@ -27,8 +26,6 @@ from peace_ros.simulation.nodes.pose_sources import (
     TwistSource,
 )
 from peace_ros.simulation.world import World, draw_world, load_world
-
-PARAMETERS: tuple[Group, ...] = (('', SatelliteViewOptions), ('', CameraOptions))
 
 
 def create_world(options: SatelliteViewOptions) -> World:
@@ -55,7 +52,7 @@ class SatelliteViewNode(PeaceNode):
             PeaceError: parameters or world cannot be used.
 
         """
-        super().__init__('satellite_view', *PARAMETERS, **options)
+        super().__init__('satellite_view', *SATELLITE_VIEW, **options)
         chosen = self.filled(SatelliteViewOptions)
         self._camera = self.filled(CameraOptions).camera
         self._view = NadirCamera(create_world(chosen), self._camera)

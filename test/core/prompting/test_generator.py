@@ -71,7 +71,6 @@ def test_only_the_categories_of_the_template_are_embedded(
 
 def test_a_static_template_needs_no_encoder() -> None:
     generator = PromptGenerator(None, None, PromptingParameters(template='D'))
-    assert generator.is_static
     prompt = generator.generate(frame_at(5))
     assert prompt.text_for('road').startswith("A bird's eye view of a road, in game")
     assert (prompt.stamp_ns, prompt.ranking) == (5, {})

@@ -40,7 +40,7 @@ def test_the_shipped_words_are_those_of_the_authors() -> None:
         (GOOD.replace('view', 'image'), "frame: 'image' is there twice"),
         (GOOD.replace('view', 'Image'), "frame: 'Image' is there twice"),
         (GOOD.replace('[3D]', '[]'), 'resolution: empty; give at least one word'),
-        (GOOD.replace('view', 'no'), 'frame: False is no text; put it in quotes'),
+        (GOOD.replace('view', 'no'), 'frame: False is not a text; put it in quotes'),
         (GOOD.replace('view', "' '"), "frame: ' '; give a word"),
         (GOOD.replace('view', "'{term}'"), 'without braces'),
         (GOOD.replace('frame', 'frames'), 'resolution, frames, environment; give the lists'),

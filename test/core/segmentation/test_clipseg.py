@@ -11,18 +11,24 @@ import numpy as np
 import pytest
 
 from peace_ros.core.domain import BundleError, ConfigurationError, Frame, ImageError, Prompt
-from peace_ros.core.inference import Bundle
 from peace_ros.core.inference.preprocess import MAX_PIXELS
-from peace_ros.core.segmentation import ClipSegSegmenter, SegmentationParameters, Terms
+from peace_ros.core.segmentation import (
+    ClipSegParameters,
+    ClipSegSegmenter,
+    SegmentationParameters,
+    Terms,
+)
 
 TERMS = Terms(('grass', 'park'), ('road', 'car', 'water'))
 SPRING = Prompt('A rendered image of {term} in spring.', 0)
 NIGHT = Prompt('A blurred picture of {term} in night.', 0)
 
 
-def make(folder: Path, terms: Terms = TERMS, **changes: Any) -> ClipSegSegmenter:
-    parameters = SegmentationParameters(threads=1, **{'clipseg_max_looks': 1, **changes})
-    return ClipSegSegmenter(Bundle.load(folder), terms, parameters)
+def make(
+    folder: Path, terms: Terms = TERMS, *, clipseg_max_looks: int = 1, **changes: Any
+) -> ClipSegSegmenter:
+    parameters = SegmentationParameters(threads=1, **changes)
+    return ClipSegSegmenter(folder, terms, parameters, ClipSegParameters(clipseg_max_looks))
 
 
 def test_a_heatmap_has_the_frames_stamp_and_scores(clipseg_folder: Path, frame: Frame) -> None:
@@ -185,7 +191,6 @@ def test_a_clip_bundle_is_refused(tiny: Any, tmp_path: Path) -> None:
     ('changes', 'says'),
     [
         ({'fusion': 'mean'}, 'fusion'),
-        ({'family': 'sam2'}, 'family'),
         ({'threads': 0}, 'threads'),
     ],
 )

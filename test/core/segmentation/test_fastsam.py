@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from peace_ros.core.domain import BundleError, ConfigurationError, Frame, ImageError, Prompt
-from peace_ros.core.inference import Bundle
 from peace_ros.core.inference.preprocess import MAX_PIXELS
 from peace_ros.core.segmentation import (
     FUSIONS,
+    FastSamParameters,
     FastSamSegmenter,
     SegmentationParameters,
     Terms,
@@ -56,8 +56,10 @@ def make(tiny: Any, tmp_path: Path) -> Make:
     ) -> FastSamSegmenter:
         folder = tmp_path / f'bundle{len(list(tmp_path.iterdir()))}'
         bundles.write_fastsam(tiny, folder, patches, **(bundle or {}))
-        settings = SegmentationParameters(threads=1, **parameters)
-        return FastSamSegmenter(Bundle.load(folder), terms, settings)
+        own = {name: value for name, value in parameters.items() if name.startswith('fastsam_')}
+        common = {name: value for name, value in parameters.items() if name not in own}
+        settings = SegmentationParameters(threads=1, **common)
+        return FastSamSegmenter(folder, terms, settings, FastSamParameters(**own))
 
     return make_segmenter
 
@@ -150,9 +152,11 @@ def test_another_prompt_gives_another_heatmap(make: Make) -> None:
 
 def test_the_second_process_encodes_no_text(make: Make, tiny: Any, tmp_path: Path) -> None:
     folder = bundles.write_fastsam(tiny, tmp_path / 'shared', STRIPES)
-    parameters = SegmentationParameters(threads=1, cache_dir=str(tmp_path / 'cache'))
+    parameters = SegmentationParameters(
+        family='fastsam', threads=1, cache_dir=str(tmp_path / 'cache')
+    )
     for calls in (1, 0):
-        segmenter = create_segmenter('fastsam', folder, TERMS, parameters)
+        segmenter = create_segmenter(parameters, bundle=folder, terms=TERMS)
         segmenter.segment(picture(GREEN, RED, BLUE), DAY)
         assert segmenter.calls['text_encoder'] == calls
 
@@ -387,4 +391,4 @@ def test_a_bundle_that_breaks_the_contract_is_refused(
 
 def test_a_bundle_of_another_family_is_refused(clipseg_folder: Path) -> None:
     with pytest.raises(BundleError, match="'fastsam' is needed"):
-        create_segmenter('fastsam', clipseg_folder, TERMS, SegmentationParameters(threads=1))
+        create_segmenter(SegmentationParameters(family='fastsam'), bundle=clipseg_folder)

@@ -22,7 +22,12 @@ from onnx import helper, numpy_helper
 from peace_ros.core.domain import BundleError, ConfigurationError, Frame, Prompt
 from peace_ros.core.inference import Bundle
 from peace_ros.core.inference.session import Session
-from peace_ros.core.segmentation import SegmentationParameters, Terms, create_segmenter
+from peace_ros.core.segmentation import (
+    FastSamParameters,
+    FastSamSegmenter,
+    SegmentationParameters,
+    Terms,
+)
 
 torch = pytest.importorskip('torch')
 pytestmark = pytest.mark.training
@@ -102,14 +107,13 @@ def test_the_bundle_runs_and_says_its_licence(
         bundle = export(checkpoint, clip, tmp_path / 'out' / 'fastsam-s')
     assert 'AGPL-3.0' in caplog.text
     assert 'AGPL-3.0' in bundle.manifest.licence
-    parameters = SegmentationParameters(
-        threads=1,
+    own = FastSamParameters(
         fastsam_min_confidence=0.0,
         fastsam_min_stability=0.0,
         fastsam_min_area=0.0,
         fastsam_max_segments=300,
     )
-    segmenter = create_segmenter('fastsam', bundle, TERMS, parameters)
+    segmenter = FastSamSegmenter(bundle, TERMS, SegmentationParameters(threads=1), own)
     rng = np.random.default_rng(3)
     maps = segmenter.term_maps(Frame(rng.integers(0, 256, (48, 64, 3), np.uint8), 7), PROMPT)
     assert maps.shape == (4, 48, 64)

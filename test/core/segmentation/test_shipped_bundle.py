@@ -23,7 +23,7 @@ PARAMETERS = SegmentationParameters(threads=1)
 
 
 def make(terms: Terms) -> Segmenter:
-    return create_segmenter(PARAMETERS.family, PARAMETERS.bundle, terms, PARAMETERS)
+    return create_segmenter(PARAMETERS, terms=terms)
 
 
 @pytest.fixture(scope='module')

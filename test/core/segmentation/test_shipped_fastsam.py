@@ -9,11 +9,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-import yaml
 
 from peace_ros.core.domain import Frame, Label, Prompt, is_safe
 from peace_ros.core.inference import Bundle
-from peace_ros.core.segmentation import SegmentationParameters, create_segmenter, load_terms
+from peace_ros.core.pipeline import segmentation_of
+from peace_ros.core.presets import load_preset
+from peace_ros.core.segmentation import create_segmenter
 from peace_ros.core.segmentation.fastsam import FastSamSegmenter
 from peace_ros.simulation.drawing import Scene, draw_scene
 
@@ -25,11 +26,7 @@ SCENES = tuple(range(20_000_100, 20_000_110))
 
 
 def make(preset: str = 'peace_fs') -> FastSamSegmenter:
-    given = yaml.safe_load((PRESETS / f'{preset}.yaml').read_text())
-    values = dict(given['segmentation']['ros__parameters'])
-    values.pop('template')
-    parameters = SegmentationParameters(threads=1, **values)
-    segmenter = create_segmenter(parameters.family, parameters.bundle, load_terms(), parameters)
+    segmenter = create_segmenter(*segmentation_of(load_preset(preset), threads=1))
     assert isinstance(segmenter, FastSamSegmenter)
     return segmenter
 

@@ -59,7 +59,7 @@ def test_negative_terms_may_be_absent(tmp_path: Path) -> None:
         ('positive: [grass, sand]\nnegative: ["road,  Sand"]\n', "'sand' is positive and neg"),
         ('positive: [grass, GRASS]\nnegative: [car]\n', "'grass' is there twice"),
         ('positive: [grass]\nnegative: ["car, car"]\n', "'car' is there twice"),
-        ('positive: [no]\nnegative: []\n', 'False is no text'),
+        ('positive: [no]\nnegative: []\n', 'False is not a text'),
         ('positive: ["grass, "]\nnegative: []\n', 'empty places'),
         ('positive: [""]\nnegative: []\n', 'empty places'),
         ('positive: ["{term}"]\nnegative: []\n', 'without braces'),

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,14 +16,15 @@ from numpy.typing import NDArray
 
 from peace_ros.core.domain import Frame, Heatmap, Prompt
 from peace_ros.core.inference import Bundle
+from peace_ros.core.pipeline import Pipeline
 from peace_ros.core.prompting import PromptGenerator, PromptingParameters
-from peace_ros.core.segmentation import SegmentationParameters, Terms
+from peace_ros.core.segmentation import SegmentationParameters, Segmenter, Terms
 from peace_ros.lab.evaluation.segmentation.cores import Cores
 
 TERMS = Terms(('grass', 'lawn'), ('water', 'spaceship'))
 
 
-class GreenSegmenter:
+class GreenSegmenter(Segmenter):
     """Calls safe what is green; water is what is blue."""
 
     terms = TERMS
@@ -44,12 +45,11 @@ def green_cores() -> Cores:
     prompting = PromptingParameters(template='DD')
     return Cores(
         'green',
-        PromptGenerator(None, None, prompting),
-        cast('Any', GreenSegmenter()),
+        Pipeline(GreenSegmenter(), PromptGenerator(None, None, prompting)),
         Bundle.load('clipseg-small'),
         prompting,
         SegmentationParameters(),
-        0.5,
+        None,
     )
 
 

@@ -88,9 +88,26 @@ def test_a_raw_threshold_moves_what_is_called_safe(
     assert strict['recall'] == 1.0
     assert strict['threshold'] == pytest.approx(0.7, abs=0.01)
     # Where the bundle puts 0.7 at one half, a score of one half is its 0.7.
-    calibrated = replace(green_cores, standing=0.7)
+    calibrated = replace(
+        green_cores, pipeline=SimpleNamespace(segmenter=SimpleNamespace(threshold=0.7))
+    )
     assert calibrated.heatmap_score(0.7) == pytest.approx(0.5)
     assert calibrated.own_score(calibrated.heatmap_score(0.3)) == pytest.approx(0.3)
+
+
+def test_pictures_that_a_flight_refuses_are_not_scored_but_told(
+    green_cores: Cores, pair_on_disk: Writer
+) -> None:
+    pair_on_disk('a', *scene(200, 150))
+    image, labels = scene(200, 150)
+    folders = pair_on_disk('covered', np.full_like(image, 90), labels)
+    outcome = run_green(green_cores, folders)
+    assert outcome.tallies['green'].names == ['a.png']
+    (skipped,) = outcome.skipped
+    assert skipped.name == 'covered.png'
+    assert 'of one colour' in skipped.reason
+    with pytest.raises(DatasetError, match=r'covered.png: .* of one colour .*--strict'):
+        run_green(green_cores, folders, strict=True)
 
 
 def test_oblong_images_are_cut_and_each_pixel_counts_once(
@@ -276,7 +293,7 @@ def test_fastsam_is_measured_by_the_same_stick(
     folder = bundles.write_fastsam(tiny, tmp_path / 'fastsam', halves)
     (tmp_path / 'terms.yaml').write_text('positive: [grass]\nnegative: [building, water]\n')
     side = bundles.SIDE_PX
-    image = np.full((side, side, 3), bundles.BLUE, np.uint8)
+    image = np.full((side, side, 3), bundles.BLUE, np.uint8) // 2
     image[:, : side // 2] = bundles.GREEN
     labels = np.full((side, side), Label.WATER, np.uint8)
     labels[:, : side // 2] = Label.GRASS

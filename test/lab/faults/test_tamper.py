@@ -11,9 +11,10 @@ import pytest
 
 from peace_ros.core.domain import Camera, ImageError, Pose
 from peace_ros.core.domain.geometry import quaternion_from_euler
+from peace_ros.core.messages import frame_from_message, stamp_ns_of
 from peace_ros.lab.faults import tamper
 from peace_ros.lab.faults.walker import Walker
-from peace_ros.nodes.messages import frame_from_message, image_message, stamp_ns
+from peace_ros.nodes.messages import image_message
 
 SECOND = 1_000_000_000
 START_NS = 100 * SECOND
@@ -52,7 +53,7 @@ def test_rare_lets_one_through_per_period() -> None:
 def test_a_frozen_camera_repeats_its_first_picture(new_stamps: bool) -> None:
     seen = passed(tamper.frozen(new_stamps=new_stamps))
     assert all(message.data == picture(0).data for message in seen)
-    stamps = [(stamp_ns(message) - START_NS) // SECOND for message in seen]
+    stamps = [(stamp_ns_of(message) - START_NS) // SECOND for message in seen]
     assert stamps == ([0, 1, 2] if new_stamps else [0, 0, 0])
 
 
@@ -83,18 +84,18 @@ def test_another_size_is_a_window_of_that_shape() -> None:
     assert np.array_equal(
         frame_from_message(flat).image_rgb, frame_from_message(picture()).image_rgb[10:30]
     )
-    assert stamp_ns(flat) == START_NS
+    assert stamp_ns_of(flat) == START_NS
 
 
 def test_stamps_shift_stand_and_run_back() -> None:
     def seconds(what: tamper.Tamper) -> list[int]:
-        return [(stamp_ns(message) - START_NS) // SECOND for message in passed(what)]
+        return [(stamp_ns_of(message) - START_NS) // SECOND for message in passed(what)]
 
     assert seconds(tamper.shifted(10.0)) == [10, 11, 12]
     assert seconds(tamper.shifted(-5.0)) == [-5, -4, -3]
     assert seconds(tamper.equal_stamps()) == [0, 0, 0]
     assert seconds(tamper.running_back()) == [0, -1, -2]
-    assert [stamp_ns(message) for message in passed(tamper.shifted(-4e9))] == [0, 0, 0]
+    assert [stamp_ns_of(message) for message in passed(tamper.shifted(-4e9))] == [0, 0, 0]
 
 
 CAMERA = Camera.from_degrees(176, 176, 73.0)
@@ -132,7 +133,7 @@ def test_both_walkers_go_through_messages() -> None:
     pose = above(0.0, 0.0, 15.0)
     grass = image_message(np.full((176, 176, 3), 120, np.uint8), 'rgb8', START_NS)
     ((_, painted),) = tamper.with_walker(walker, CAMERA, lambda _: pose)(grass)
-    assert stamp_ns(painted) == START_NS
+    assert stamp_ns_of(painted) == START_NS
     assert painted.data != grass.data
     safe = image_message(np.full((88, 88), 230, np.uint8), 'mono8', START_NS)
     ((_, seen),) = tamper.with_walker_seen(walker, CAMERA, lambda _: pose)(safe)

@@ -13,16 +13,11 @@ import numpy as np
 import pytest
 
 from peace_ros.core.domain import RecordingError
+from peace_ros.core.messages import diagnostic_values, frame_from_message, stamp_ns_of
 from peace_ros.lab.replay import ReplayOptions, SourceOptions, replay
 from peace_ros.lab.replay.compare import Reference, differences, take_reference
 from peace_ros.recording import BagReader, BagWriter, VideoWriter
-from peace_ros.recording.messages import (
-    diagnostic_values,
-    frame_from_message,
-    jpeg_image,
-    pose_stamped,
-    stamp_ns_of,
-)
+from peace_ros.recording.messages import jpeg_message, pose_stamped
 
 DATA = Path(__file__).resolve().parents[2] / 'data'
 SMALL = DATA / 'small.mcap'
@@ -81,10 +76,38 @@ def test_the_same_recording_gives_the_same_bytes_of_heatmaps(tmp_path) -> None:
     assert len(found[0]) == 3
 
 
+def pattern(level: int, width: int = 96) -> np.ndarray:
+    """Return a picture that a camera may have taken."""
+    rng = np.random.default_rng(level)
+    return np.clip(rng.normal(100, 30, (96, width, 3)) + level / 9, 5, 250).astype(np.uint8)
+
+
+@pytest.mark.parametrize(
+    ('bad', 'says'),
+    [
+        (np.full((96, 96, 3), 120, np.uint8), 'of one colour'),
+        (np.full((96, 96, 3), 255, np.uint8), 'of one colour'),
+        (pattern(3, width=128), 'its sides 1.33 : 1 where the camera began with 1.00 : 1'),
+    ],
+)
+def test_frames_that_a_flight_refuses_are_refused_and_counted(tmp_path, bad, says) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        for k, each in enumerate([pattern(0), pattern(1), bad, bad, pattern(4)]):
+            stamp_ns = 1 + k * 500_000_000
+            bag.write('/pose', stamp_ns, pose_stamped(stamp_ns, (0.0, 0.0, 50.0), (1, 0, 0, 0)))
+            bag.write('/image', stamp_ns, jpeg_message(each, stamp_ns, 95))
+    report, folder = replay(ReplayOptions(tmp_path / 'a.mcap', 'dd_cs', tmp_path / 'out'))
+    assert (report.frames, report.unusable_frames) == (3, 2)
+    assert says in report.first_fault
+    with BagReader(folder / 'replay.mcap') as bag:
+        stamps = [stamp_ns_of(message) for _, _, message in bag.messages(['/heatmap'])]
+    assert stamps == [1, 500_000_001, 2_000_000_001]
+
+
 def test_a_video_gets_an_overlay_video(tmp_path) -> None:
     with VideoWriter(tmp_path / 'a.mp4', 5.0) as video:
         for k in range(6):
-            video.write(np.full((96, 96, 3), 30 * k, np.uint8))
+            video.write(pattern(30 * k))
     options = ReplayOptions(tmp_path / 'a.mp4', out=tmp_path / 'out', part=SourceOptions(every=2))
     report, folder = replay(options)
     assert report.frames == 3
@@ -96,7 +119,7 @@ def test_a_video_gets_an_overlay_video(tmp_path) -> None:
 def test_nothing_is_written_half_when_no_frame_can_be_used(tmp_path) -> None:
     with BagWriter(tmp_path / 'a.mcap') as bag:
         bag.write('/pose', 1, pose_stamped(1, (0.0, 0.0, 50.0), (1.0, 0.0, 0.0, 0.0)))
-        image = jpeg_image(np.zeros((32, 32, 3), np.uint8), 1)
+        image = jpeg_message(np.zeros((32, 32, 3), np.uint8), 1)
         image.data = image.data[:30]
         bag.write('/image', 1, image)
     with pytest.raises(RecordingError, match='none of 1 frames'):

@@ -10,13 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from peace_ros.core.domain import ConfigurationError, PeaceError, RecordingError
-from peace_ros.core.landing import LandingParameters
-from peace_ros.core.presets import load_preset, preset_names
-from peace_ros.core.prompting import PromptingParameters
+from peace_ros.core.domain import RecordingError
 from peace_ros.lab.replay import SourceOptions, open_source
 from peace_ros.recording import BagWriter, VideoWriter
-from peace_ros.recording.messages import diagnostic_array, jpeg_image, pose_stamped
+from peace_ros.recording.messages import diagnostic_array, jpeg_message, pose_stamped
 
 SMALL = Path(__file__).resolve().parents[2] / 'data' / 'small.mcap'
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -33,7 +30,7 @@ def write_bag(path: Path, *, topics=('/image/compressed',), frames: int = 6, bro
             stamp_ns = k * SECOND // 2
             bag.write('/ground_truth/pose', stamp_ns, pose_stamped(stamp_ns, (0, 0, 50), LEVEL))
             for topic in topics:
-                image = jpeg_image(picture(20 * k), stamp_ns)
+                image = jpeg_message(picture(20 * k), stamp_ns)
                 if k in broken:
                     image.data = image.data[:40]
                 bag.write(topic, stamp_ns, image)
@@ -87,10 +84,10 @@ def test_a_frame_that_is_cut_short_is_told_and_the_others_are_used(tmp_path) -> 
 def test_the_recorded_engagement_is_found(tmp_path) -> None:
     with BagWriter(tmp_path / 'a.mcap') as bag:
         for k, state in enumerate(('IDLE', 'IDLE', 'SEARCHING', 'AIMING'), start=1):
-            status = diagnostic_array(k * SECOND, 'landing', 0, '', {'state': state})
+            status = diagnostic_array(k * SECOND, 'landing', 0, '', [('state', state)])
             bag.write('/landing/status', k * SECOND, status)
             bag.write('/pose', k * SECOND, pose_stamped(k * SECOND, (0, 0, 50), LEVEL))
-            bag.write('/image', k * SECOND, jpeg_image(picture(9), k * SECOND))
+            bag.write('/image', k * SECOND, jpeg_message(picture(9), k * SECOND))
     assert open_source(tmp_path / 'a.mcap', SourceOptions()).engage_ns == 3 * SECOND
 
 
@@ -122,35 +119,3 @@ def test_a_bad_source_is_one_sentence(tmp_path, name) -> None:
 def test_senseless_parts_are_refused(given) -> None:
     with pytest.raises(RecordingError, match='give'):
         SourceOptions(**given)
-
-
-def test_the_six_presets_are_there_and_fill_the_parameters() -> None:
-    assert preset_names() == ['d_cs', 'd_fs', 'dd_cs', 'dd_fs', 'peace_cs', 'peace_fs']
-    preset = load_preset('DD-CS')
-    assert preset.fill('prompt_generator', PromptingParameters).template == 'DD'
-    assert preset.fill('prompt_generator', PromptingParameters, threads=1).threads == 1
-    assert preset.fill('landing', LandingParameters) == LandingParameters()
-
-
-def test_a_preset_of_ones_own_is_read_and_checked(tmp_path) -> None:
-    path = tmp_path / 'mine.yaml'
-    path.write_text(
-        '/**:\n  ros__parameters:\n    threads: 1\n'
-        'landing:\n  ros__parameters:\n    safety_radius_m: 3\n'
-    )
-    preset = load_preset(str(path))
-    assert preset.fill('landing', LandingParameters).safety_radius_m == 3.0
-    assert preset.fill('prompt_generator', PromptingParameters).threads == 1
-    path.write_text('landing:\n  ros__parameters:\n    safety_radius_m: wide\n')
-    with pytest.raises(ConfigurationError, match="safety_radius_m = 'wide'"):
-        load_preset(str(path)).fill('landing', LandingParameters)
-
-
-@pytest.mark.parametrize('text', ['', '- 1\n', 'landing: 3\n', 'a: [\n'])
-def test_a_file_that_is_no_preset_is_refused(tmp_path, text) -> None:
-    path = tmp_path / 'bad.yaml'
-    path.write_text(text)
-    with pytest.raises(ConfigurationError, match=r'bad\.yaml'):
-        load_preset(str(path))
-    with pytest.raises(PeaceError, match='peace_cs'):
-        load_preset('no_such')

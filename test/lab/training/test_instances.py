@@ -20,7 +20,6 @@ from peace_ros.core.inference import Bundle, Session  # noqa: E402
 from peace_ros.core.segmentation import (  # noqa: E402
     SegmentationParameters,
     create_segmenter,
-    load_terms,
 )
 from peace_ros.lab.training.annotations import VEGETATION  # noqa: E402
 from peace_ros.lab.training.batches import pixel_class_table  # noqa: E402
@@ -293,7 +292,7 @@ def test_the_recipe_writes_a_bundle_that_the_segmentation_accepts(
     assert 0.0 < bundle.manifest.recommended['threshold'] < 1.0
     assert 'seed 0' in bundle.manifest.provenance
     parameters = SegmentationParameters(family='fastsam', bundle=str(bundle.folder), threads=1)
-    segmenter = create_segmenter('fastsam', str(bundle.folder), load_terms(), parameters)
+    segmenter = create_segmenter(parameters)
     image = np.random.default_rng(0).integers(0, 255, (90, 120, 3), np.uint8)
     heatmap = segmenter.segment(Frame(image, 3), Prompt('A view of {term}.', 3))
     assert np.isfinite(heatmap.safety).all()

@@ -15,8 +15,8 @@ from pathlib import Path
 import cv2
 import pytest
 
+from peace_ros.core.messages import diagnostic_values
 from peace_ros.recording import BagReader
-from peace_ros.recording.messages import diagnostic_values
 
 pytestmark = pytest.mark.integration
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.lab.faults.bench import CAMERA_HZ
-from peace_ros.nodes.options import CameraOptions
 from peace_ros.simulation.demo.isolation import PROFILE, isolate
 
 NAMES = ('ROS_DOMAIN_ID', 'ROS_LOG_DIR', 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_STATIC_PEERS')

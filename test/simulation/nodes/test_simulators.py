@@ -16,14 +16,9 @@ from sensor_msgs.msg import CameraInfo, Image
 
 from peace_ros.core.domain import ConfigurationError, Pose, VehicleError, WorldError
 from peace_ros.core.domain.geometry import yaw_from_quaternion
+from peace_ros.core.messages import frame_from_message, ns_from_time, pose_from_message, stamp_ns_of
 from peace_ros.nodes import qos
-from peace_ros.nodes.messages import (
-    frame_from_message,
-    ns_from_time,
-    pose_from_message,
-    pose_to_message,
-    stamp_ns,
-)
+from peace_ros.nodes.messages import pose_to_message
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
 from peace_ros.simulation.nodes.autopilot_sim import AutopilotSimNode
 from peace_ros.simulation.nodes.satellite_view import SatelliteViewNode
@@ -61,7 +56,7 @@ def test_shows_the_ground_below_the_pose_with_its_stamp(bench, world):
     assert frame.image_rgb.shape == (352, 64, 3)
     assert tuple(frame.image_rgb[176, 32]) == (255, 0, 0)
     bench.until(lambda: bool(infos))
-    assert stamp_ns(infos[0]) == 111
+    assert stamp_ns_of(infos[0]) == 111
     images.clear()
     bench.until(lambda: bool(images), lambda: poses.publish(at(2_000_000_000, -20.0, -30.0)))
     assert tuple(frame_from_message(images[-1]).image_rgb[176, 32]) == (0, 0, 255)
@@ -74,7 +69,7 @@ def test_keeps_its_rate_by_the_stamps(bench, world):
     poses = bench.offer(PoseStamped, 'ground_truth/pose', qos.POSE)
     step_ns, stamps = 33_000_000, iter(range(10**9, 10**10, 33_000_000))
     bench.until(lambda: len(images) >= 12, lambda: poses.publish(at(next(stamps), 0.0, 0.0)))
-    gaps = np.diff([stamp_ns(each) for each in images])
+    gaps = np.diff([stamp_ns_of(each) for each in images])
     assert gaps.min() >= 2 * step_ns
     assert abs(gaps.mean() - 1e8) < 0.2e8
 
@@ -124,10 +119,10 @@ def test_follows_an_autopilot_and_publishes_its_pose(bench, world, take_off, ori
     same = np.dot(pose.quaternion_ned_frd, truth.quaternion_ned_frd)
     assert abs(same) > 0.999
     assert yaw_from_quaternion(pose.quaternion_ned_frd) == pytest.approx(radians(40.0), abs=0.05)
-    stamps = [stamp_ns(each) for each in poses]
+    stamps = [stamp_ns_of(each) for each in poses]
     assert all(later > earlier for earlier, later in pairwise(stamps))
     assert abs(node.clock_ns() - stamps[-1]) < 5e9
-    assert {stamp_ns(each) for each in images} & set(stamps)
+    assert {stamp_ns_of(each) for each in images} & set(stamps)
 
 
 def test_the_pose_of_a_signing_autopilot_needs_its_key(bench, world, tmp_path, capfd):
@@ -164,7 +159,7 @@ def test_the_autopilot_publishes_pose_and_clock_on_its_own_time(bench):
     clocks = bench.heard(Clock, '/clock', qos.CLOCK)
     bench.run(AutopilotSimNode, port=0, speed=5.0, pose_rate=40.0)
     bench.until(lambda: len(poses) >= 30 and len(clocks) >= 30)
-    stamps = [stamp_ns(each) for each in poses]
+    stamps = [stamp_ns_of(each) for each in poses]
     assert all(later > earlier for earlier, later in pairwise(stamps))
     assert np.median(np.diff(stamps)) == pytest.approx(25e6, rel=0.5)
     ticks = [ns_from_time(each.clock) for each in clocks]
@@ -179,7 +174,7 @@ def test_at_wall_speed_there_is_no_clock_and_stamps_are_of_the_node(bench):
     node = bench.run(AutopilotSimNode, port=0)
     bench.until(lambda: len(poses) >= 10)
     assert not clocks
-    assert abs(node.clock_ns() - stamp_ns(poses[-1])) < 5e9
+    assert abs(node.clock_ns() - stamp_ns_of(poses[-1])) < 5e9
 
 
 def test_a_twist_vehicle_stops_when_nobody_speaks():

@@ -5,10 +5,12 @@
 from peace_ros.core.segmentation.fastsam.detections import Detections, detect
 from peace_ros.core.segmentation.fastsam.letterbox import Letterbox, Placement
 from peace_ros.core.segmentation.fastsam.masks import Segment, assemble
+from peace_ros.core.segmentation.fastsam.parameters import FastSamParameters
 from peace_ros.core.segmentation.fastsam.segmenter import FastSamSegmenter
 
 __all__ = [
     'Detections',
+    'FastSamParameters',
     'FastSamSegmenter',
     'Letterbox',
     'Placement',

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
-from peace_ros.core.inference import Bundle
+from peace_ros.core.domain import ConfigurationError, Frame, Heatmap, Prompt
 from peace_ros.core.inference.contract import (
     IMAGE_EMBEDDING,
     NEGATIVE,
@@ -26,10 +25,15 @@ from peace_ros.core.segmentation.fastsam.detections import detect
 from peace_ros.core.segmentation.fastsam.letterbox import Letterbox, Placement
 from peace_ros.core.segmentation.fastsam.masks import Segment, assemble
 from peace_ros.core.segmentation.fastsam.painting import paint
+from peace_ros.core.segmentation.fastsam.parameters import FastSamParameters
 from peace_ros.core.segmentation.fastsam.scoring import is_usable, term_shares
 from peace_ros.core.segmentation.fastsam.selection import Selection, select
 from peace_ros.core.segmentation.fusion import calibrated
-from peace_ros.core.segmentation.segmenter import BundleSegmenter, SegmentationParameters
+from peace_ros.core.segmentation.segmenter import (
+    BundleOrName,
+    BundleSegmenter,
+    SegmentationParameters,
+)
 from peace_ros.core.segmentation.terms import Terms
 
 
@@ -48,13 +52,24 @@ class _Painted:
 class FastSamSegmenter(BundleSegmenter):
     """A Segmenter over a bundle of the family ``fastsam``."""
 
-    def __init__(self, bundle: Bundle, terms: Terms, parameters: SegmentationParameters) -> None:
+    FAMILY = 'fastsam'
+    ROLES = ('segmenter', 'image_encoder', 'text_encoder')
+    MEASURED_WITH = 'softmax'
+
+    def __init__(
+        self,
+        bundle: BundleOrName,
+        terms: Terms,
+        parameters: SegmentationParameters,
+        own: FastSamParameters | None = None,
+    ) -> None:
         """Open the bundle's graphs and run them once.
 
         Args:
             bundle: of the family ``fastsam``.
             terms: what to look for.
             parameters: of the segmentation; its bundle and terms are those given here.
+            own: of the family; None: as they are declared.
 
         Raises:
             BundleError: the bundle is of another family or its graphs do not fit it.
@@ -66,17 +81,15 @@ class FastSamSegmenter(BundleSegmenter):
                 'family fastsam without negative terms would call every segment safe, because '
                 'the terms share each segment among them: name negative terms or choose clipseg'
             )
-        bundle.require_family('fastsam')
-        super().__init__(bundle, ('segmenter', 'image_encoder', 'text_encoder'), terms, parameters)
-        self._logit_scale = bundle.manifest.logit_scale
-        self._threshold = _threshold(bundle, parameters.fusion)
-        self._letterbox = Letterbox(bundle.manifest.input)
-        self._cutter = Cutter(bundle.manifest.encoder_input, parameters.fastsam_max_segments)
-        self._warm_up(bundle)
+        super().__init__(bundle, terms, parameters)
+        self._own = own or FastSamParameters()
+        self._letterbox = Letterbox(self._manifest.input)
+        self._cutter = Cutter(self._manifest.encoder_input, self._own.fastsam_max_segments)
+        self._warm_up()
         self._loaded()
 
-    def _warm_up(self, bundle: Bundle) -> None:
-        size = bundle.manifest.input
+    def _warm_up(self) -> None:
+        size = self._manifest.input
         pixels, _ = self._letterbox(np.zeros((size.height, size.width, 3), np.uint8))
         predictions, prototypes = self._sessions['segmenter'].warm_up(
             [PREDICTIONS, PROTOTYPES], {PIXEL_VALUES: pixels}
@@ -137,26 +150,26 @@ class FastSamSegmenter(BundleSegmenter):
             raise self._unusable('segmenter', 'boxes or masks that are not finite')
         detections = detect(
             predictions[0],
-            min_confidence=self._parameters.fastsam_min_confidence,
-            max_overlap=self._parameters.fastsam_max_overlap,
+            min_confidence=self._own.fastsam_min_confidence,
+            max_overlap=self._own.fastsam_max_overlap,
         )
         segments = assemble(detections, prototypes[0], self._cell_px, place)
         frame_px = place.width_px * place.height_px
-        return select(segments, frame_px, self._parameters), place
+        return select(segments, frame_px, self._own), place
 
     def _paint(self, frame: Frame, prompt: Prompt) -> _Painted:
         selection, place = self._find(frame)
         terms = self._embeddings(prompt)
         shares = self._shares(frame, selection.scored, place, terms)
         safety = self._safety(shares)
-        if self._parameters.fastsam_overlap == 'least_safe':
+        if self._own.fastsam_overlap == 'least_safe':
             order = np.argsort(-safety, kind='stable')
         else:
             order = np.arange(len(safety))  # largest first already
         labels = paint(selection, order.tolist(), place.height_px, place.width_px)
         return _Painted(
             labels,
-            np.concatenate([np.zeros((1, len(self._terms)), np.float32), shares]),
+            np.concatenate([np.zeros((1, len(self.terms)), np.float32), shares]),
             np.concatenate([np.zeros(1, np.float32), safety]),
         )
 
@@ -164,18 +177,18 @@ class FastSamSegmenter(BundleSegmenter):
         self, frame: Frame, segments: list[Segment], place: Placement, terms: NDArray[np.float32]
     ) -> NDArray[np.float32]:
         if not segments:
-            return np.zeros((0, len(self._terms)), np.float32)
+            return np.zeros((0, len(self.terms)), np.float32)
         crops = self._cutter(frame.image_rgb, segments, place)
         (embeddings,) = self._sessions['image_encoder'].run(
             [IMAGE_EMBEDDING], {PIXEL_VALUES: crops}
         )
         if embeddings.shape != (len(segments), terms.shape[1]) or not is_usable(embeddings):
             raise self._unusable('image_encoder', f'embeddings of shape {embeddings.shape}')
-        return term_shares(embeddings, terms, self._logit_scale)
+        return term_shares(embeddings, terms, self._manifest.logit_scale)
 
     def _safety(self, shares: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the fused score of each segment, [N] float32, 0 to 1."""
-        positive, negative = np.split(shares, [len(self._terms.positive)], axis=1)
+        positive, negative = np.split(shares, [len(self.terms.positive)], axis=1)
         scores = {
             POSITIVE: positive.max(axis=1),
             NEGATIVE: negative.max(axis=1),
@@ -189,16 +202,3 @@ class FastSamSegmenter(BundleSegmenter):
         if not is_usable(texts):
             raise self._unusable('text_encoder', 'a text embedding of length zero')
         return texts
-
-
-def _threshold(bundle: Bundle, fusion: str) -> float:
-    """Return the bundle's recommendation, which was measured with the sum of positive shares."""
-    if fusion != 'softmax':
-        return 0.5
-    threshold = float(bundle.manifest.recommended.get('threshold', 0.5))
-    if not 0.0 < threshold < 1.0:
-        raise BundleError(
-            f'{bundle.folder / "manifest.json"}: recommended threshold {threshold} must lie '
-            'between 0 and 1, both excluded: correct the manifest or export the bundle anew'
-        )
-    return threshold

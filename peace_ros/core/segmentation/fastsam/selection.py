@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from peace_ros.core.segmentation.fastsam.masks import Segment
-from peace_ros.core.segmentation.segmenter import SegmentationParameters
+from peace_ros.core.segmentation.fastsam.parameters import FastSamParameters
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Selection:
     """Too small, or beyond the cap: something is there, and nobody looks what it is."""
 
 
-def select(segments: list[Segment], frame_px: int, parameters: SegmentationParameters) -> Selection:
+def select(segments: list[Segment], frame_px: int, parameters: FastSamParameters) -> Selection:
     """Divide the segments; an unstable one of any size worth scoring is noise and left out.
 
     Args:

@@ -56,7 +56,7 @@ class _Bench:
             )
         threads = cores.segmentation.threads
         self.segmenter = FeatureSegmenter(
-            cores.bundle, cores.segmenter.terms, threads, cores.segmentation.clipseg_max_looks
+            cores.bundle, cores.segmenter.terms, threads, cores.own.clipseg_max_looks
         )
         encoder = SharedEncoder(ClipEncoder(Bundle.load(cores.prompting.bundle), threads=threads))
         opposite = OppositeEncoder(encoder)

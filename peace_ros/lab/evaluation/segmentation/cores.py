@@ -1,25 +1,21 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The two perception cores of a preset, as the nodes make them."""
+"""The pipeline of a preset, with what a user sets in place of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import exp, log
+from typing import Any
 
 from peace_ros.core.domain import Frame, Heatmap, Prompt
-from peace_ros.core.inference import Bundle, ClipEncoder
+from peace_ros.core.inference import Bundle
 from peace_ros.core.inference.bundle import user_models_dir
+from peace_ros.core.pipeline import Pipeline, create_generator, segmentation_of
 from peace_ros.core.presets import load_preset
-from peace_ros.core.prompting import PromptGenerator, PromptingParameters, load_vocabularies
-from peace_ros.core.prompting.templates import categories_of, resolve_template
+from peace_ros.core.prompting import PromptingParameters
 from peace_ros.core.resources import models_dir
-from peace_ros.core.segmentation import (
-    SegmentationParameters,
-    Segmenter,
-    create_segmenter,
-    load_terms,
-)
+from peace_ros.core.segmentation import SegmentationParameters, Segmenter, create_segmenter
 
 BUNDLED_FASTSAM = 'fastsam-small'
 
@@ -40,25 +36,34 @@ class Overrides:
 
 @dataclass(frozen=True)
 class Cores:
-    """Prompt generator and segmenter of one configuration."""
+    """The pipeline of one configuration, and what it was made from."""
 
     name: str
-    generator: PromptGenerator
-    segmenter: Segmenter
+    pipeline: Pipeline
     bundle: Bundle
     prompting: PromptingParameters
     segmentation: SegmentationParameters
-    standing: float
-    """The network's own score that stands at one half of the heatmap."""
+    own: Any
+    """Parameters of the segmentation's family."""
+
+    @property
+    def segmenter(self) -> Segmenter:
+        """What makes heatmaps."""
+        return self.pipeline.segmenter
+
+    @property
+    def standing(self) -> float:
+        """The network's own score that stands at one half of the heatmap."""
+        return self.segmenter.threshold
 
     def prompt(self, frame: Frame) -> Prompt:
         """Return the prompt of a frame on its own, whatever came before."""
-        self.generator.reset()
-        return self.generator.generate(frame)
+        self.pipeline.reset()
+        return self.pipeline.prompt(frame)
 
     def segment(self, frame: Frame, prompt: Prompt) -> Heatmap:
-        """Return the heatmap of a frame."""
-        return self.segmenter.segment(frame, prompt)
+        """Return the heatmap of a frame; ImageError where a flight would refuse it."""
+        return self.pipeline.heatmap(frame, prompt)
 
     def own_score(self, score: float) -> float:
         """Return the network's own score of a heatmap's score."""
@@ -87,64 +92,26 @@ def build_cores(config: str, overrides: Overrides) -> Cores | str:
 
     """
     preset = load_preset(config)
-    threads = overrides.threads
-    segmentation = preset.fill('segmentation', SegmentationParameters, threads=threads)
-    given = overrides.fastsam if segmentation.family == 'fastsam' else overrides.clipseg
-    bundle_name = given or segmentation.bundle
-    if not given and segmentation.family == 'fastsam' and not _is_there(bundle_name):
+    given = {'threads': overrides.threads, 'fusion': overrides.fusion, 'terms': overrides.terms}
+    segmentation, own = segmentation_of(preset, **given, clipseg_max_looks=overrides.max_looks)
+    name = overrides.fastsam if segmentation.family == 'fastsam' else overrides.clipseg
+    name = name or segmentation.bundle
+    if name == segmentation.bundle and segmentation.family == 'fastsam' and not _is_there(name):
         if not _is_there(BUNDLED_FASTSAM):
-            names = ' or '.join(
-                repr(each) for each in dict.fromkeys((bundle_name, BUNDLED_FASTSAM))
-            )
+            names = ' or '.join(repr(each) for each in dict.fromkeys((name, BUNDLED_FASTSAM)))
             return f'{preset.name} is left out: there is no bundle {names}; give one with --fastsam'
-        bundle_name = BUNDLED_FASTSAM
-    segmentation = replace(
-        segmentation,
-        bundle=bundle_name,
-        fusion=overrides.fusion or segmentation.fusion,
-        terms=overrides.terms or segmentation.terms,
-        clipseg_max_looks=overrides.max_looks or segmentation.clipseg_max_looks,
+        name = BUNDLED_FASTSAM
+    segmentation, bundle = replace(segmentation, bundle=name), Bundle.load(name)
+    prompting = preset.fill(
+        'prompt_generator',
+        PromptingParameters,
+        threads=overrides.threads,
+        bundle=overrides.clip,
+        vocabularies=overrides.vocabularies,
     )
-    bundle = Bundle.load(bundle_name)
-    segmenter = create_segmenter(
-        segmentation.family, bundle, load_terms(segmentation.terms), segmentation
-    )
-    prompting = preset.fill('prompt_generator', PromptingParameters, threads=threads)
-    prompting = replace(
-        prompting,
-        bundle=overrides.clip or prompting.bundle,
-        vocabularies=overrides.vocabularies or prompting.vocabularies,
-    )
-    return Cores(
-        preset.name,
-        create_generator(prompting),
-        segmenter,
-        bundle,
-        prompting,
-        segmentation,
-        standing_score(bundle, segmentation),
-    )
-
-
-def create_generator(parameters: PromptingParameters) -> PromptGenerator:
-    """Make the prompt generator; a static template needs no network."""
-    if not categories_of(resolve_template(parameters.template)):
-        return PromptGenerator(None, None, parameters)
-    encoder = ClipEncoder(
-        Bundle.load(parameters.bundle), threads=parameters.threads, providers=parameters.providers
-    )
-    return PromptGenerator(encoder, load_vocabularies(parameters.vocabularies), parameters)
-
-
-def standing_score(bundle: Bundle, parameters: SegmentationParameters) -> float:
-    """Return the network's score that its segmenter puts at one half of the heatmap.
-
-    The bundle's recommendation holds for CLIPSeg and the set difference, with which it was
-    measured; everything else publishes its scores as they are.
-    """
-    if parameters.family != 'clipseg' or parameters.fusion != 'set_difference':
-        return 0.5
-    return float(bundle.manifest.recommended.get('threshold', 0.5))
+    segmenter = create_segmenter(segmentation, own, bundle=bundle)
+    pipeline = Pipeline(segmenter, create_generator(prompting))
+    return Cores(preset.name, pipeline, bundle, prompting, segmentation, own)
 
 
 def _is_there(name: str) -> bool:

@@ -157,7 +157,7 @@ def _model(cores: Cores) -> Figures:
         'fusion': cores.segmentation.fusion,
         'terms': cores.segmentation.terms,
         'template': cores.prompting.template,
-        'clip': '' if cores.generator.is_static else cores.prompting.bundle,
+        'clip': '' if cores.prompting.is_static else cores.prompting.bundle,
         'threads': cores.segmentation.threads,
     }
 

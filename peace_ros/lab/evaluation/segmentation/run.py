@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import Frame
+from peace_ros.core.domain import Frame, ImageError
 from peace_ros.lab.evaluation.segmentation.cores import Cores
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError, SampleError
 from peace_ros.lab.evaluation.segmentation.histograms import BINS, LABELS, count_labels, count_terms
@@ -142,12 +142,24 @@ def fitted(safety: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.fl
     return np.asarray(resized, np.float32)
 
 
-def looks(image_rgb: NDArray[np.uint8], cores: Cores, tile_px: int | None) -> Iterator[TileLook]:
-    """Yield what a configuration makes of each tile of an image."""
+def looks(
+    image_rgb: NDArray[np.uint8],
+    cores: Cores,
+    tile_px: int | None,
+    refuse: Callable[[str], object] = lambda _: None,
+) -> Iterator[TileLook]:
+    """Yield what a configuration makes of each tile; ``refuse`` is told why there is none of one.
+
+    A flight gets no heatmap of such an image either.
+    """
     for tile, frame in cut(image_rgb, tile_px):
         start = time.perf_counter()
-        prompt = cores.prompt(frame)
-        safety = cores.segment(frame, prompt).safety
+        try:
+            prompt = cores.prompt(frame)
+            safety = cores.segment(frame, prompt).safety
+        except ImageError as error:
+            refuse(str(error))
+            continue
         seconds = time.perf_counter() - start
         safety = fitted(safety, frame.image_rgb.shape)
         yield TileLook(tile, safety, frame, prompt.template, seconds)
@@ -179,20 +191,33 @@ def evaluate(
     skipped: list[Skipped] = []
     tallies = {cores.name: Tally.of(cores) for cores in configurations}
     for name, pair in readable(source, skipped, strict=strict, watch=watch):
+        refused: list[str] = []
         for cores in configurations:
-            _score(name, pair, cores, tile_px, tallies[cores.name], score_terms)
+            # The camera watch refuses the same tiles whatever the configuration.
+            refused = _score(name, pair, cores, tile_px, tallies[cores.name], score_terms)
+        if refused and strict:
+            raise DatasetError(f'{name}: {refused[0]} (--strict)')
+        if refused:
+            skipped.append(Skipped(name, f'{len(refused)} tiles refused: {refused[0]}'))
+    if not any(tally.frames for tally in tallies.values()):
+        first = f'{skipped[0].name}: {skipped[0].reason}'
+        raise DatasetError(
+            f'{source.title}: no image could be scored; the first of {len(skipped)}: {first}'
+        )
     return Outcome(source, tallies, tuple(skipped))
 
 
 def _score(
     name: str, pair: Pair, cores: Cores, tile_px: int | None, tally: Tally, score_terms: bool
-) -> None:
+) -> list[str]:
+    """Score an image; return why tiles of it got no heatmap."""
     image, labels = pair
     counts = np.zeros((LABELS, BINS), np.uint32)
     scored = tally.meanings.any(axis=1)
     terms = np.zeros((int(scored.sum()), 2, BINS), np.uint32)
     seconds, tiles = 0.0, 0
-    for look in looks(image, cores, tile_px):
+    refused: list[str] = []
+    for look in looks(image, cores, tile_px, refused.append):
         own = look.tile.labels_of(labels)
         counts += count_labels(own, look.safety)
         seconds, tiles = seconds + look.seconds, tiles + 1
@@ -201,8 +226,11 @@ def _score(
             maps = cores.segmenter.term_maps(look.frame, cores.prompt(look.frame))
             height, width = maps.shape[1:]
             terms += count_terms(nearest(own, width, height), maps[scored], tally.meanings[scored])
+    if not tiles:
+        return refused
     tally.names.append(name)
     tally.counts.append(counts)
     tally.term_counts.append(terms)
     tally.tiles.append(tiles)
     tally.seconds.append(seconds)
+    return refused

@@ -1,0 +1,195 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""ROS messages <-> the nouns of the domain, for messages of rclpy and of rosbags alike.
+
+Readers take any object with the fields of the message. :class:`MessageBuilder` makes messages of
+whatever classes it is given. Stamps are carried over, never renewed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from peace_ros.core.domain import DepthImage, Frame, Heatmap, ImageError, Pose, Prompt
+from peace_ros.core.images import jpeg_from_rgb, pixels_from_raw, rgb_from_message
+from peace_ros.core.poses import pose_from_enu_flu
+from peace_ros.core.prompting.pairs import prompt_from_pairs
+
+NANOSECONDS = 1_000_000_000
+CAMERA_FRAME = 'camera'
+_FLOAT_BYTES = 4
+
+
+def ns_from_time(stamp: Any) -> int:
+    """Return the nanoseconds of a builtin_interfaces/Time."""
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
+
+
+def stamp_ns_of(message: Any) -> int:
+    """Return the stamp of a message's header in nanoseconds."""
+    return ns_from_time(message.header.stamp)
+
+
+def frame_from_message(message: Any) -> Frame:
+    """Return the frame of an Image or CompressedImage; ImageError says what is wrong with it."""
+    return Frame(rgb_from_message(message), stamp_ns_of(message))
+
+
+def heatmap_from_image(message: Any) -> Heatmap:
+    """Return the heatmap of a mono8 Image; any other encoding is an ImageError."""
+    if message.encoding != 'mono8':
+        raise ImageError(f'heatmap encoding {message.encoding!r}: publish it as mono8')
+    levels = pixels_from_raw(
+        message.encoding, message.width, message.height, message.step, message.data
+    )
+    return Heatmap(levels[:, :, 0].astype(np.float32) / np.float32(255.0), stamp_ns_of(message))
+
+
+def heatmap_levels(heatmap: Heatmap) -> NDArray[np.uint8]:
+    """Return a heatmap as mono8: 255 is certainly safe; what is not a number becomes 0."""
+    safety = np.nan_to_num(heatmap.safety, nan=0.0, posinf=0.0, neginf=0.0)
+    levels: NDArray[np.uint8] = np.rint(np.clip(safety, 0.0, 1.0) * 255.0).astype(np.uint8)
+    return levels
+
+
+def depth_from_image(message: Any) -> DepthImage:
+    """Return the depth image of a 32FC1 Image (metres); any other encoding is an ImageError."""
+    if message.encoding != '32FC1':
+        raise ImageError(f'depth encoding {message.encoding!r}: publish it as 32FC1, in metres')
+    row_bytes, size = message.width * _FLOAT_BYTES, message.height * message.step
+    if message.width < 1 or message.step < row_bytes or len(message.data) != size:
+        raise ImageError(
+            f'depth image {message.width} x {message.height}, {message.step} bytes per row: '
+            f'{len(message.data)} bytes came, {size} fit'
+        )
+    rows = np.frombuffer(bytes(message.data), np.uint8).reshape(message.height, message.step)
+    order = '>f4' if message.is_bigendian else '<f4'
+    depth = np.ascontiguousarray(rows[:, :row_bytes]).view(order).astype(np.float32)
+    return DepthImage(depth, stamp_ns_of(message))
+
+
+def pose_from_message(message: Any) -> Pose:
+    """Return the pose (NED, FRD) of a message in ENU, FLU; the ground is at z = 0.
+
+    Args:
+        message: PoseStamped, PoseWithCovarianceStamped or Odometry.
+
+    Raises:
+        VehicleError: a value is not finite or the quaternion is not of unit length.
+
+    """
+    pose = message.pose
+    pose = pose.pose if hasattr(pose, 'pose') else pose
+    return pose_from_enu_flu(stamp_ns_of(message), pose.position, pose.orientation)
+
+
+def pose_from_transform(transform: Any) -> Pose:
+    """Return the pose of a tf transform local frame -> vehicle, as :func:`pose_from_message`."""
+    body = transform.transform
+    return pose_from_enu_flu(stamp_ns_of(transform), body.translation, body.rotation)
+
+
+def diagnostic_values(message: Any) -> dict[str, str]:
+    """Return the key/value pairs of all statuses of a DiagnosticArray."""
+    return {pair.key: pair.value for status in message.status for pair in status.values}
+
+
+def prompt_from_message(message: Any) -> Prompt:
+    """Return the prompt of its DiagnosticArray; ConfigurationError when it holds none."""
+    return prompt_from_pairs(diagnostic_values(message), stamp_ns_of(message))
+
+
+class MessageBuilder:
+    """Makes the messages that flights and recordings share."""
+
+    def __init__(self, class_of: Callable[[str, str], Any], octets: Callable[[bytes], Any]) -> None:
+        """Take the classes to build from.
+
+        Args:
+            class_of: (package, name) -> class that takes its fields as keywords.
+            octets: makes what those classes want for a field uint8[].
+        """
+        self._class = class_of
+        self._octets = octets
+
+    def time(self, at_ns: int) -> Any:
+        """Return a builtin_interfaces/Time."""
+        sec, nanosec = divmod(at_ns, NANOSECONDS)
+        return self._class('builtin_interfaces', 'Time')(sec=sec, nanosec=nanosec)
+
+    def header(self, at_ns: int, frame_id: str = '') -> Any:
+        """Return a std_msgs/Header."""
+        return self._class('std_msgs', 'Header')(stamp=self.time(at_ns), frame_id=frame_id)
+
+    def image(
+        self, pixels: NDArray[np.uint8], encoding: str, at_ns: int, frame_id: str = CAMERA_FRAME
+    ) -> Any:
+        """Return the Image of a height x width (mono8) or height x width x 3 (rgb8) array."""
+        return self._class('sensor_msgs', 'Image')(
+            header=self.header(at_ns, frame_id),
+            height=pixels.shape[0],
+            width=pixels.shape[1],
+            encoding=encoding,
+            is_bigendian=0,
+            step=pixels.size // pixels.shape[0],
+            data=self._octets(pixels.tobytes()),
+        )
+
+    def heatmap(self, heatmap: Heatmap, frame_id: str = CAMERA_FRAME) -> Any:
+        """Return the mono8 Image of a heatmap."""
+        return self.image(heatmap_levels(heatmap), 'mono8', heatmap.stamp_ns, frame_id)
+
+    def jpeg(
+        self,
+        image_rgb: NDArray[np.uint8],
+        at_ns: int,
+        quality: int = 90,
+        frame_id: str = CAMERA_FRAME,
+    ) -> Any:
+        """Return the JPEG CompressedImage of a height x width x 3 RGB array."""
+        return self._class('sensor_msgs', 'CompressedImage')(
+            header=self.header(at_ns, frame_id),
+            format='rgb8; jpeg compressed bgr8',
+            data=self._octets(jpeg_from_rgb(image_rgb, quality)),
+        )
+
+    def diagnostic_array(
+        self, at_ns: int, name: str, level: Any, sentence: str, values: Iterable[tuple[str, str]]
+    ) -> Any:
+        """Return a DiagnosticArray of one status: a sentence and key/value pairs.
+
+        ``level`` is 0 (ok), 1 (warn) or 2 (error); classes of rclpy want it as one byte.
+        """
+        pair = self._class('diagnostic_msgs', 'KeyValue')
+        status = self._class('diagnostic_msgs', 'DiagnosticStatus')(
+            level=level,
+            name=name,
+            message=sentence,
+            hardware_id='',
+            values=[pair(key=key, value=value) for key, value in values],
+        )
+        return self._class('diagnostic_msgs', 'DiagnosticArray')(
+            header=self.header(at_ns), status=[status]
+        )
+
+    def pose_stamped(
+        self,
+        at_ns: int,
+        position_enu: tuple[float, float, float],
+        attitude_enu_flu: tuple[float, float, float, float],
+        frame_id: str = 'map',
+    ) -> Any:
+        """Return a PoseStamped (ENU metres; quaternion w, x, y, z)."""
+        x, y, z = position_enu
+        qw, qx, qy, qz = attitude_enu_flu
+        pose = self._class('geometry_msgs', 'Pose')(
+            position=self._class('geometry_msgs', 'Point')(x=x, y=y, z=z),
+            orientation=self._class('geometry_msgs', 'Quaternion')(x=qx, y=qy, z=qz, w=qw),
+        )
+        return self._class('geometry_msgs', 'PoseStamped')(
+            header=self.header(at_ns, frame_id), pose=pose
+        )

@@ -1,0 +1,136 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Heatmaps, decisions and set-points of the small bag, against those of version 3523282.
+
+``small_digest.npz`` was written by that version. The networks' sums differ a little between
+processors, so their heatmaps are compared with a tolerance, and the decisions are those that the
+landing makes over the stored heatmaps. ``python test_digest.py FILE`` writes what this version
+gives.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from zlib import crc32
+
+import cv2
+import numpy as np
+import pytest
+
+from peace_ros.core.domain import Heatmap
+from peace_ros.lab.replay import run
+from peace_ros.lab.replay.line import ReplayLine, Step
+from peace_ros.lab.replay.source import SourceOptions, open_source
+
+DATA = Path(__file__).resolve().parents[2] / 'data'
+STORED = DATA / 'small_digest.npz'
+SIDE = 44
+"""Heatmaps are stored as SIDE x SIDE means, quantised like those of the topic ``heatmap``."""
+
+
+def replayed(preset: str = 'peace_cs') -> tuple[list, list]:
+    """Return the looks and the decisions of a replay of the small bag."""
+    replayer = run.Replayer(open_source(DATA / 'small.mcap', SourceOptions()), preset)
+    events = list(replayer.events())
+    return (
+        [each for each in events if not isinstance(each, Step)],
+        [each for each in events if isinstance(each, Step)],
+    )
+
+
+def digest_of_looks(looks: list) -> dict[str, np.ndarray]:
+    levels = [np.rint(255.0 * look.heatmap.safety).astype(np.uint8) for look in looks]
+    small = [cv2.resize(each, (SIDE, SIDE), interpolation=cv2.INTER_AREA) for each in levels]
+    return {
+        'stamps_ns': np.array([look.heatmap.stamp_ns for look in looks]),
+        'prompts': np.array([look.prompt.template for look in looks]),
+        'heatmaps': np.stack(small),
+        'checksums': np.array([crc32(each.tobytes()) for each in levels], np.uint32),
+    }
+
+
+def digest_of_steps(steps: list) -> dict[str, np.ndarray]:
+    """Reasons are numbered by first appearance: their wording may be improved."""
+    numbers: dict[str, int] = {}
+    reasons, sites, setpoints = [], [], []
+    for step in steps:
+        decision = step.decision
+        kind = re.sub(r'[-\d.]+', '#', decision.reason)
+        reasons.append(numbers.setdefault(kind, len(numbers)))
+        site, setpoint = decision.site, decision.setpoint
+        sites.append(
+            [np.nan] * 4
+            if site is None
+            else [site.north_m, site.east_m, site.clearance_m, site.area_m2]
+        )
+        setpoints.append([setpoint.v_north_m_s, setpoint.v_east_m_s, setpoint.v_down_m_s])
+    return {
+        'states': np.array([step.decision.state.value for step in steps]),
+        'reasons': np.array(reasons),
+        'sites': np.array(sites),
+        'setpoints': np.array(setpoints),
+        'setpoint_stamps_ns': np.array([step.decision.setpoint.stamp_ns for step in steps]),
+    }
+
+
+class StoredSegmenter:
+    """Gives back the stored heatmaps."""
+
+    def __init__(self, stamps_ns: np.ndarray, heatmaps: np.ndarray) -> None:
+        self._levels = dict(zip(stamps_ns.tolist(), heatmaps, strict=True))
+
+    def segment(self, frame, prompt) -> Heatmap:
+        safety = self._levels[frame.stamp_ns].astype(np.float32) / np.float32(255.0)
+        return Heatmap(safety, frame.stamp_ns)
+
+
+def decided_over(stamps_ns: np.ndarray, heatmaps: np.ndarray) -> dict[str, np.ndarray]:
+    """Return what the landing decides over stored heatmaps."""
+
+    class Line(ReplayLine):
+        def __init__(self, *given, **options) -> None:
+            super().__init__(*given, **options)
+            self.pipeline.segmenter = StoredSegmenter(stamps_ns, heatmaps)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run, 'ReplayLine', Line)
+        _, steps = replayed('dd_cs')
+    return digest_of_steps(steps)
+
+
+@pytest.fixture(scope='module')
+def stored() -> SimpleNamespace:
+    with np.load(STORED) as arrays:
+        return SimpleNamespace(**{name: arrays[name] for name in arrays.files})
+
+
+def test_heatmaps_and_prompts_are_those_of_the_stored_version(stored) -> None:
+    found = SimpleNamespace(**digest_of_looks(replayed()[0]))
+    np.testing.assert_array_equal(found.stamps_ns, stored.stamps_ns)
+    assert np.mean(found.prompts == stored.prompts) >= 0.95
+    apart = np.abs(found.heatmaps.astype(int) - stored.heatmaps.astype(int))
+    assert stored.heatmaps.std() > 30.0, 'nearly the same everywhere: this would prove nothing'
+    assert apart.mean() <= 0.5
+    assert np.mean(apart > 3) <= 0.005
+    if found.checksums[0] == stored.checksums[0]:
+        # This processor sums as the one did that wrote the file, so all must be the same.
+        np.testing.assert_array_equal(found.checksums, stored.checksums)
+
+
+def test_decisions_and_setpoints_are_those_of_the_stored_version(stored) -> None:
+    found = SimpleNamespace(**decided_over(stored.stamps_ns, stored.heatmaps))
+    assert len(set(stored.states)) >= 4, 'too few states: this would prove nothing'
+    np.testing.assert_array_equal(found.states, stored.states)
+    np.testing.assert_array_equal(found.reasons, stored.reasons)
+    np.testing.assert_array_equal(found.setpoint_stamps_ns, stored.setpoint_stamps_ns)
+    np.testing.assert_allclose(found.sites, stored.sites, atol=1e-6)
+    np.testing.assert_allclose(found.setpoints, stored.setpoints, atol=1e-6)
+
+
+if __name__ == '__main__':
+    seen = digest_of_looks(replayed()[0])
+    decided = decided_over(seen['stamps_ns'], seen['heatmaps'])
+    np.savez_compressed(sys.argv[1], **seen, **decided)
