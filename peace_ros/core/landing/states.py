@@ -41,6 +41,8 @@ class State(str, Enum):
 
 STILL_STATES = frozenset({State.IDLE, State.WAITING, State.HANDOVER, State.HOLD, State.ABORTED})
 """States in which the set-point is zero."""
+SILENT_STATES = frozenset({State.IDLE, State.ABORTED})
+"""States in which nothing is sent to the vehicle."""
 
 
 @dataclass(frozen=True)

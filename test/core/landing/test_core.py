@@ -220,7 +220,7 @@ def test_a_pose_that_is_not_finite_is_not_used(core):
         ({'pose': None}, 0.1, 'where it is'),
         ({'pose': pose_at(6.0, nan)}, 0.1, 'not valid'),
         ({'pose': pose_at(6.0, -3.0)}, 0.1, 'not valid'),
-        ({'landed': True}, 0.1, 'not in the air'),
+        ({'landed': True}, 0.1, 'on the ground'),
     ],
 )
 def test_bad_telemetry_stops_and_good_telemetry_goes_on(core, changes, age_s, word):
