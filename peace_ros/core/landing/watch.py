@@ -56,7 +56,7 @@ class ControlWatch:
 
 
 def bad_vehicle(telemetry: Telemetry | None, age_s: float, parameters: LandingParameters) -> str:
-    """Return why the vehicle is not known to be in the air at a valid position, empty when it is."""
+    """Return why the vehicle does not fly at a known, valid position, empty when it does."""
     p = parameters
     if telemetry is None or telemetry.pose is None:
         silent = 'no telemetry: the autopilot has not said where it is; check its streams'
