@@ -1,51 +1,44 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Beginning and ending a landing: the services, and what speaks against it."""
+"""The services that begin and end a landing."""
 
 from __future__ import annotations
 
 import threading
-from math import isfinite
 from typing import Protocol, cast
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from peace_ros.core.domain import Telemetry, VehicleError
-from peace_ros.core.landing import LandingParameters, State
+from peace_ros.core.domain import VehicleError
 from peace_ros.core.vehicle import VehicleLink
-
-SILENT_STATES = frozenset({State.IDLE, State.ABORTED})
-"""States in which nothing is submitted to the vehicle."""
-
-_MAY_BEGIN = frozenset({State.IDLE, State.HOLD, State.HANDOVER, State.ABORTED})
 
 
 class Engageable(Protocol):
     """What the services need of the node; it is an rclpy Node besides."""
 
-    def reason_against(self) -> str:
-        """Return what speaks against beginning now, empty when nothing does."""
+    def check_engagement(self) -> str:
+        """Return why a landing cannot begin now, empty when it can."""
 
     def link(self) -> VehicleLink | None:
         """Return the vehicle, None until it is reached."""
 
     def begin(self) -> str:
-        """Begin the landing; return what speaks against it, empty when it began."""
+        """Begin the landing; return why it cannot begin, empty when it began."""
 
     def hold_level(self) -> str:
-        """Hold level without a position where that was chosen; return what became of it."""
+        """Hold level without a position where that was chosen; return the result in words."""
 
     def end_landing(self) -> bool:
-        """End the landing; return whether one was flown."""
+        """End the landing; return whether one was under way."""
 
 
 class EngagementServices:
-    """``~/engage`` and ``~/disengage``, and engaging once by itself where that is asked for.
+    """``~/engage`` and ``~/disengage``, and engaging once automatically where that is asked for.
 
-    Asking for control may take seconds, in which steps and heatmaps must go on: the services have
-    a callback group of their own.
+    A request for control may take seconds, and steps and heatmaps must go on meanwhile: the
+    services have a callback group of their own.
     """
 
     def __init__(self, node: Engageable, *, auto: bool) -> None:
@@ -57,8 +50,8 @@ class EngagementServices:
             self._ros.create_service(Trigger, f'~/{name}', callback, callback_group=beside)
 
     def engage_when_ready(self) -> None:
-        """Engage beside the caller, once, when it was asked for and nothing speaks against it."""
-        if self._auto_due and not self._node.reason_against():
+        """Engage once, in a thread, when that was asked for and a landing can begin."""
+        if self._auto_due and not self._node.check_engagement():
             self._auto_due = False
             threading.Thread(target=self._auto_engage, name='auto_engage', daemon=True).start()
 
@@ -73,11 +66,11 @@ class EngagementServices:
         return response
 
     def _engage(self, *, by_person: bool) -> str:
-        """Ask for control once; return what speaks against the landing, empty when it began."""
+        """Request control once; return why the landing did not begin, empty when it began."""
         link = self._node.link()
-        problem = self._node.reason_against()
+        problem = self._node.check_engagement()
         if not problem and link is not None:
-            problem = _ask_for_control(link, by_person=by_person)
+            problem = _request_control(link, by_person=by_person)
         problem = problem or self._node.begin()
         if problem:
             self._ros.get_logger().warning(f'not engaged: {problem}')
@@ -96,59 +89,10 @@ class EngagementServices:
         return response
 
 
-def _ask_for_control(link: VehicleLink, *, by_person: bool) -> str:
+def _request_control(link: VehicleLink, *, by_person: bool) -> str:
     """Return why the vehicle does not obey, empty when it does."""
     try:
         result = link.request_control(by_person=by_person)
     except VehicleError as error:
         return str(error)
     return '' if result else f'control {result.answer.value}: {result.reason}'
-
-
-def reason_against(
-    state: State,
-    told: Telemetry | None,
-    telemetry_age_s: float,
-    map_age_s: float,
-    parameters: LandingParameters,
-) -> str:
-    """Return a sentence why the landing cannot be engaged, empty when it can.
-
-    Args:
-        state: Of the landing so far.
-        told: What the vehicle last said.
-        telemetry_age_s: Steady clock, since it said it.
-        map_age_s: Node clock, since the newest heatmap in the map was taken.
-        parameters: Their limits of age hold here too.
-
-    """
-    if state not in _MAY_BEGIN:
-        return f'a landing is under way already: {state.value}'
-    return _against_vehicle(told, telemetry_age_s, parameters) or _against_map(
-        map_age_s, parameters
-    )
-
-
-def _against_vehicle(told: Telemetry | None, age_s: float, parameters: LandingParameters) -> str:
-    if told is None or told.pose is None:
-        silent = 'no telemetry: the autopilot has not said where it is; check its streams'
-        return silent if told is None else told.position_problem or silent
-    limit_s = parameters.telemetry_age_limit_s
-    if not age_s <= limit_s:
-        return f'telemetry is {age_s:.1f} s old, limit {limit_s} s: check the line'
-    if not told.armed:
-        return 'the vehicle is not armed: a landing begins in the air'
-    if told.landed:
-        return 'the vehicle is on the ground: a landing begins in the air'
-    return ''
-
-
-def _against_map(age_s: float, parameters: LandingParameters) -> str:
-    if not isfinite(age_s):
-        return 'no heatmap yet: is segmentation running, and do its stamps and ours share a clock?'
-    limit_s = parameters.heatmap_age_limit_s
-    if age_s > limit_s:
-        return (
-            f'the newest heatmap is {age_s:.1f} s old, limit {limit_s} s: is segmentation running?'
-        )
-    return ''

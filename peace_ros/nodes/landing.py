@@ -14,11 +14,18 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 
 from peace_ros.core.domain import Setpoint, Telemetry, VehicleError
-from peace_ros.core.landing import Decision, LandingCore, LandingParameters, State
+from peace_ros.core.landing import (
+    SILENT_STATES,
+    Decision,
+    LandingCore,
+    LandingParameters,
+    State,
+    engagement_problem,
+)
 from peace_ros.core.mapping import MapParameters
 from peace_ros.core.node_parameters import CameraOptions, LandingOptions, groups_of
 from peace_ros.core.vehicle import SenderParameters, SetpointSender, VehicleLink, VehicleParameters
-from peace_ros.nodes.engagement import SILENT_STATES, EngagementServices, reason_against
+from peace_ros.nodes.engagement import EngagementServices
 from peace_ros.nodes.inputs import LandingInputs
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.status import DecisionPublisher, VehicleSituation
@@ -93,13 +100,13 @@ class LandingNode(PeaceNode):
         except VehicleError as error:
             self.say('sender', str(error))
 
-    def reason_against(self) -> str:
-        """Return what speaks against beginning a landing now, empty when nothing does."""
+    def check_engagement(self) -> str:
+        """Return why a landing cannot begin now, empty when it can."""
         told, age_s = self._telemetry()
         with self._lock:
             stamp_ns = self._core.safety_map.stamp_ns
             map_age_s = inf if stamp_ns is None else (self.clock_ns() - stamp_ns) / 1e9
-            return self._access.reason_against or reason_against(
+            return self._access.vehicle_problem or engagement_problem(
                 self._state, told, age_s, map_age_s, self._landing
             )
 

@@ -12,9 +12,8 @@ from geometry_msgs.msg import PointStamped, TwistStamped
 from rclpy.node import Node
 
 from peace_ros.core.domain import Telemetry
-from peace_ros.core.landing import Decision, State
+from peace_ros.core.landing import SILENT_STATES, Decision, State
 from peace_ros.core.landing.pairs import decision_pairs
-from peace_ros.nodes.engagement import SILENT_STATES
 from peace_ros.nodes.messages import (
     ERROR,
     OK,

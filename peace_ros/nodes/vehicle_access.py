@@ -71,7 +71,7 @@ class VehicleAccess:
         return '' if self._connection is None else self._connection.problem
 
     @property
-    def reason_against(self) -> str:
+    def vehicle_problem(self) -> str:
         """Why a landing cannot begin as far as the vehicle is concerned, empty when it can."""
         link = self.link
         if self.problem or not isinstance(link, MavlinkLink):

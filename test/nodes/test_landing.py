@@ -13,10 +13,8 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Twist, TwistStamped
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from peace_ros.core.domain import ConfigurationError, Heatmap, Pose, Telemetry
-from peace_ros.core.landing import LandingParameters, State
+from peace_ros.core.domain import ConfigurationError, Heatmap, Pose
 from peace_ros.nodes import qos
-from peace_ros.nodes.engagement import reason_against
 from peace_ros.nodes.landing import LandingNode
 from peace_ros.nodes.messages import heatmap_to_image, pose_to_message
 
@@ -157,30 +155,3 @@ def test_tf_needs_the_package_that_the_wheels_lack(bench):
     except ImportError:
         with pytest.raises(ConfigurationError, match='tf2_msgs'):
             bench.run(LandingNode, interface='twist', pose_source='tf')
-
-
-POSE = Pose(0, 0.0, 0.0, -100.0, LEVEL, 100.0)
-FLYING = {'pose': POSE, 'armed': True, 'landed': False}
-
-
-@pytest.mark.parametrize(
-    ('state', 'told', 'telemetry_age_s', 'map_age_s', 'word'),
-    [
-        (State.LANDING, FLYING, 0.0, 0.0, 'under way'),
-        (State.IDLE, None, 0.0, 0.0, 'no telemetry'),
-        (State.IDLE, {**FLYING, 'pose': None}, 0.0, 0.0, 'no telemetry'),
-        (State.IDLE, FLYING, 5.0, 0.0, '5.0 s old'),
-        (State.IDLE, FLYING, float('nan'), 0.0, 'old'),
-        (State.IDLE, {**FLYING, 'armed': False}, 0.0, 0.0, 'not armed'),
-        (State.IDLE, {**FLYING, 'landed': True}, 0.0, 0.0, 'on the ground'),
-        (State.IDLE, FLYING, 0.0, float('inf'), 'no heatmap yet'),
-        (State.IDLE, FLYING, 0.0, 9.0, '9.0 s old'),
-        (State.IDLE, FLYING, 0.0, 0.0, ''),
-        (State.ABORTED, FLYING, 0.0, 0.0, ''),
-    ],
-)
-def test_says_what_speaks_against_a_landing(state, told, telemetry_age_s, map_age_s, word):
-    telemetry = None if told is None else Telemetry(1, **told)
-    reason = reason_against(state, telemetry, telemetry_age_s, map_age_s, LandingParameters())
-    assert word in reason
-    assert bool(reason) == bool(word)

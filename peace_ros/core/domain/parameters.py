@@ -8,13 +8,15 @@ from it, and a test holds the shipped YAML against it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from math import isnan
 from typing import Any, cast
 
 from peace_ros.core.domain.errors import ConfigurationError
 
 _METADATA_KEY = 'peace_ros.parameter'
+_UNITS = {'_m_s': 'm/s', '_m': 'm', '_s': 's', '_deg': 'deg'}
+"""Units of parameters by the ends of their names."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,10 @@ def parameter(
     high: float | None = None,
     choices: tuple[str, ...] = (),
 ) -> Any:
-    """Declare a field of a parameter dataclass; lists are given as tuples."""
+    """Declare a field of a parameter dataclass; lists are given as tuples.
+
+    A unit that the name ends with (``_m_s``, ``_m``, ``_s``, ``_deg``) need not be given.
+    """
     info = ParameterInfo('', default, unit, low, high, choices, description)
     return field(default=default, metadata={_METADATA_KEY: info})
 
@@ -51,17 +56,8 @@ def describe(parameters: type[Any] | Any) -> tuple[ParameterInfo, ...]:
     infos = []
     for each in fields(parameters):
         info = cast('ParameterInfo', each.metadata[_METADATA_KEY])
-        infos.append(
-            ParameterInfo(
-                each.name,
-                info.default,
-                info.unit,
-                info.low,
-                info.high,
-                info.choices,
-                info.description,
-            )
-        )
+        by_name = next((unit for end, unit in _UNITS.items() if each.name.endswith(end)), '')
+        infos.append(replace(info, name=each.name, unit=info.unit or by_name))
     return tuple(infos)
 
 

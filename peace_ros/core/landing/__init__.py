@@ -4,11 +4,13 @@
 
 from peace_ros.core.landing.core import LandingCore
 from peace_ros.core.landing.decision import Decision, Focus, Verdict, VerdictKind
+from peace_ros.core.landing.engagement import engagement_problem
 from peace_ros.core.landing.parameters import SAFETY_THRESHOLD_FLOOR, LandingParameters
-from peace_ros.core.landing.states import State
+from peace_ros.core.landing.states import SILENT_STATES, State
 
 __all__ = [
     'SAFETY_THRESHOLD_FLOOR',
+    'SILENT_STATES',
     'Decision',
     'Focus',
     'LandingCore',
@@ -16,4 +18,5 @@ __all__ = [
     'State',
     'Verdict',
     'VerdictKind',
+    'engagement_problem',
 ]

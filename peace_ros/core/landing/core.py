@@ -7,11 +7,13 @@ The order of a step is that of responsibility: data, site, state, guidance, guar
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, Pose, Telemetry
 from peace_ros.core.landing.decision import Decision
-from peace_ros.core.landing.helm import Command, Helm
+from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.intake import HeatmapIntake
-from peace_ros.core.landing.lookout import Lookout, Sighting
+from peace_ros.core.landing.lookout import Lookout
 from peace_ros.core.landing.parameters import LandingParameters
 from peace_ros.core.landing.states import State
 from peace_ros.core.landing.watch import valid_pose
@@ -84,16 +86,19 @@ class LandingCore:
         if self._intake.drops != self._drops:
             self._drops = self._intake.drops
             self._lookout.forget_choice()
-        pose = valid_pose(telemetry, self.parameters)
-        sighting = self._lookout.look(now_ns, pose, self._helm.state, self._helm.without_site_s)
-        command = self._helm.decide(
+        pose, before = valid_pose(telemetry, self.parameters), self._helm.state
+        sighting = self._lookout.look(now_ns, pose, before, self._helm.without_site_s)
+        decision = self._helm.decide(
             now_ns, telemetry, telemetry_age_s, sighting, self._intake.last_rejection
         )
-        if command.state is not command.before and self._lookout.follow(
-            command.before, command.state, now_ns
-        ):
+        if decision.state is not before and self._lookout.follow(before, decision.state, now_ns):
             self._helm.fail_attempt()
-        return self._decision(command, sighting)
+        return replace(
+            decision,
+            counts=dict(self._intake.counts),
+            failed_sites=self._lookout.failed_sites,
+            attempts=self._helm.attempts,
+        )
 
     def _keep_time(self, now_ns: int) -> None:
         """A clock that jumps back (a simulation begun anew) makes everything known worthless."""
@@ -103,24 +108,3 @@ class LandingCore:
             self._lookout.forget_choice()
             self._helm.restart_clock(now_ns)
         self._last_ns = now_ns
-
-    def _decision(self, command: Command, sighting: Sighting) -> Decision:
-        relaxed = sighting.threshold < self.parameters.safety_threshold
-        note = f'; threshold relaxed to {sighting.threshold:.2f}' if relaxed else ''
-        return Decision(
-            state=command.state,
-            reason=command.reason + note,
-            setpoint=command.setpoint,
-            verdict=sighting.verdict,
-            site=sighting.verdict.site,
-            effective_threshold=sighting.threshold,
-            map_age_s=sighting.map_age_s,
-            focus=sighting.focus,
-            guard_notes=command.guard_notes,
-            counts=dict(self._intake.counts),
-            outcome=command.outcome,
-            time_in_state_s=command.time_in_state_s,
-            failed_sites=self._lookout.failed_sites,
-            attempts=self._helm.attempts,
-            relaxed=relaxed,
-        )

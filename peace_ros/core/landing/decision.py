@@ -59,8 +59,6 @@ class Decision:
     setpoint: Setpoint
     """Guarded: this is what may be sent."""
     verdict: Verdict
-    site: Site | None
-    """Target of AIMING and LANDING; the candidate while SEARCHING."""
     effective_threshold: float
     """Safety score from which ground counts as safe now."""
     map_age_s: float
@@ -80,3 +78,8 @@ class Decision:
     """Descents that failed."""
     relaxed: bool = False
     """The threshold has sunk below its parameter, which only the parameter relaxation allows."""
+
+    @property
+    def site(self) -> Site | None:
+        """The site of the verdict: target of AIMING and LANDING, candidate while SEARCHING."""
+        return self.verdict.site

@@ -1,44 +1,27 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The last word on every set-point: knows nothing of states, only ever makes motion smaller.
+"""The last check of every set-point: knows nothing of states, and only makes motion smaller.
 
-Each component of what leaves lies between zero and what came in, so that zero stays zero, a
-climb never becomes a descent, and the most restrictive limit wins.
+Each component of the result lies between zero and what was asked for: zero stays zero, a climb
+never becomes a descent, and the most restrictive limit wins.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import hypot, inf, isfinite
+from dataclasses import replace
+from math import hypot, isfinite
 
-from peace_ros.core.domain import Pose, Setpoint, Site
+from peace_ros.core.domain import Setpoint
 from peace_ros.core.landing.parameters import CELL_SCORE_FLOOR, LandingParameters
+from peace_ros.core.landing.situation import Situation
 
 _NS = 1e-9
 _STEP_LIMIT_S = 0.5
-"""A late step does not earn a larger change of the set-point than this much time would."""
+"""After a late step the set-point grows by no more than this time allows."""
 _REACTION_S = 1.0
-"""Time constant of the slow-down above the floor and before the fence: the measured autopilot
-passes 0.7 m beyond at 1 m/s (vertical), 7 m at 5 m/s (lateral)."""
+"""Time constants of the slow-down above the floor and before the fence: the measured autopilot
+overshoots by 0.7 m at 1 m/s (vertical) and by 7 m at 5 m/s (lateral)."""
 _FENCE_REACTION_S = 1.5
-
-
-@dataclass(frozen=True)
-class GuardInput:
-    """What the guard looks at besides the wish; None is unknown."""
-
-    now_ns: int
-    pose: Pose | None
-    telemetry_age_s: float
-    map_age_s: float
-    home: tuple[float, float] | None
-    """North and east of where the landing began."""
-    site: Site | None = None
-    """The SITE of the verdict, None without one."""
-    ground_score: float = 0.0
-    """Worst safety score of the map under the vehicle and its radius; 0 is unknown."""
-    ground_age_s: float = inf
-    """Age of the oldest look at that ground."""
 
 
 class Guard:
@@ -49,12 +32,11 @@ class Guard:
         self._last = Setpoint(0)
         self._last_ns: int | None = None
 
-    def limit(self, wish: Setpoint, given: GuardInput) -> tuple[Setpoint, tuple[str, ...]]:
+    def limit(self, wish: Setpoint, given: Situation) -> tuple[Setpoint, tuple[str, ...]]:
         """Return what may be flown, and a note for each limit that acted."""
         notes: list[str] = []
         allowed = wish
-        rules = (_finite, self._ages, self._ground, self._floor, self._speed, self._fence)
-        for rule in rules:
+        for rule in (_finite, self._data, self._descent, self._floor, self._speed, self._fence):
             limited, note = rule(allowed, given)
             if limited != allowed:
                 notes.append(note)
@@ -65,43 +47,43 @@ class Guard:
         self._last, self._last_ns = limited, given.now_ns
         return limited, tuple(notes)
 
-    def _ages(self, wish: Setpoint, given: GuardInput) -> tuple[Setpoint, str]:
+    def _data(self, wish: Setpoint, given: Situation) -> tuple[Setpoint, str]:
+        """No motion at all without a position of now."""
         pose = given.pose
         if pose is None or not given.telemetry_age_s <= self._p.telemetry_age_limit_s:
             return Setpoint(wish.stamp_ns), 'stopped: telemetry is missing or old'
-        if not isfinite(pose.north_m) or not isfinite(pose.east_m):
+        if not pose.has_position:
             return Setpoint(wish.stamp_ns), 'stopped: the position is not a number'
-        if wish.v_down_m_s > 0.0 and not given.map_age_s <= self._p.descent_heatmap_age_limit_s:
-            return replace(wish, v_down_m_s=0.0), 'descent stopped: the map is old'
         return wish, ''
 
-    def _ground(self, wish: Setpoint, given: GuardInput) -> tuple[Setpoint, str]:
+    def _descent(self, wish: Setpoint, given: Situation) -> tuple[Setpoint, str]:
         """Down only within the clearance of a SITE, on ground that the map has just seen safe."""
+        p, pose, seen = self._p, given.pose, given.sighting
+        site = seen.verdict.site
+        if wish.v_down_m_s <= 0.0 or pose is None:
+            return wish, ''
+        if not seen.map_age_s <= p.descent_heatmap_age_limit_s:
+            problem = 'the map is old'
+        elif site is None or not site.distance_m(pose) + p.safety_radius_m <= site.clearance_m:
+            problem = 'no site under the vehicle'
+        elif not seen.ground_score >= CELL_SCORE_FLOOR:
+            problem = 'the ground below is not safe'
+        elif not seen.ground_age_s <= p.descent_heatmap_age_limit_s:
+            problem = 'the ground below is not in view'
+        elif not pose.altitude_agl_m <= p.altitude_limit_m:
+            problem = 'the altitude is not valid'
+        else:
+            return wish, ''
+        return replace(wish, v_down_m_s=0.0), f'descent stopped: {problem}'
+
+    def _floor(self, wish: Setpoint, given: Situation) -> tuple[Setpoint, str]:
         if wish.v_down_m_s <= 0.0 or given.pose is None:
             return wish, ''
-        site = given.site
-        if site is None or not (
-            site.distance_m(given.pose) + self._p.safety_radius_m <= site.clearance_m
-        ):
-            return replace(wish, v_down_m_s=0.0), 'descent stopped: no site under the vehicle'
-        if not given.ground_score >= CELL_SCORE_FLOOR:
-            return replace(wish, v_down_m_s=0.0), 'descent stopped: the ground below is not safe'
-        if not given.ground_age_s <= self._p.descent_heatmap_age_limit_s:
-            return replace(wish, v_down_m_s=0.0), 'descent stopped: the ground below is not in view'
-        return wish, ''
+        room_m = max(0.0, given.pose.altitude_agl_m - self._p.handover_altitude_m)
+        down = min(wish.v_down_m_s, room_m / _REACTION_S)
+        return replace(wish, v_down_m_s=down), 'descent limited: the floor is near'
 
-    def _floor(self, wish: Setpoint, given: GuardInput) -> tuple[Setpoint, str]:
-        if wish.v_down_m_s <= 0.0 or given.pose is None:
-            return wish, ''
-        room_m = given.pose.altitude_agl_m - self._p.handover_altitude_m
-        if not isfinite(room_m) or given.pose.altitude_agl_m > self._p.altitude_limit_m:
-            return replace(wish, v_down_m_s=0.0), 'descent stopped: altitude is not valid'
-        allowed = max(0.0, room_m / _REACTION_S)
-        if wish.v_down_m_s <= allowed:
-            return wish, ''
-        return replace(wish, v_down_m_s=allowed), 'descent limited: the floor is near'
-
-    def _speed(self, wish: Setpoint, _given: GuardInput) -> tuple[Setpoint, str]:
+    def _speed(self, wish: Setpoint, _given: Situation) -> tuple[Setpoint, str]:
         lateral = hypot(wish.v_north_m_s, wish.v_east_m_s)
         scale = min(1.0, self._p.lateral_speed_limit / lateral) if lateral > 0.0 else 1.0
         down = min(self._p.z_speed_landing, max(-self._p.z_speed_climbing, wish.v_down_m_s))
@@ -110,19 +92,19 @@ class Guard:
             'speed limited',
         )
 
-    def _fence(self, wish: Setpoint, given: GuardInput) -> tuple[Setpoint, str]:
+    def _fence(self, wish: Setpoint, given: Situation) -> tuple[Setpoint, str]:
         radius = self._p.geofence_radius_m
         if radius == 0.0 or given.pose is None or given.home is None:
             return wish, ''
-        north, east = given.pose.north_m - given.home[0], given.pose.east_m - given.home[1]
+        north, east = given.pose.north_m - given.home.north_m, given.pose.east_m - given.home.east_m
         distance = hypot(north, east)
         outward = 0.0
         if distance > 0.0:
             outward = (wish.v_north_m_s * north + wish.v_east_m_s * east) / distance
         allowed = max(0.0, (radius - distance) / _FENCE_REACTION_S)
-        # Also a speed across the radius leads out when the room is used up by it.
         if outward <= allowed:
             return wish, ''
+        # Both components shrink: the direction stays.
         scale = allowed / outward
         limited = Setpoint(
             wish.stamp_ns, wish.v_north_m_s * scale, wish.v_east_m_s * scale, wish.v_down_m_s
@@ -142,14 +124,14 @@ class Guard:
         )
 
 
-def _finite(wish: Setpoint, _given: GuardInput) -> tuple[Setpoint, str]:
+def _finite(wish: Setpoint, _given: Situation) -> tuple[Setpoint, str]:
     if all(isfinite(v) for v in (wish.v_north_m_s, wish.v_east_m_s, wish.v_down_m_s)):
         return wish, ''
     return Setpoint(wish.stamp_ns), 'stopped: the set-point was not finite'
 
 
 def _grown(last: float, wish: float, room: float) -> float:
-    """Move from the last value towards the wish: away from zero by room at most, to it at once."""
+    """Return the wish, at most ``room`` farther from zero than the last; stops are at once."""
     start = last if last * wish > 0.0 else 0.0
     if wish >= 0.0:
         return min(wish, start + room)

@@ -5,36 +5,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import hypot
 
 from peace_ros.core.domain import Pose, Setpoint, Site
 from peace_ros.core.landing.parameters import LandingParameters
-from peace_ros.core.landing.states import State
+from peace_ros.core.landing.situation import Situation
+from peace_ros.core.landing.states import STILL_STATES, State
+from peace_ros.core.landing.watch import at_safe_altitude
 
 _FLOOR_GAIN = 0.6
 """1/s; descending at this rate of the remaining height, the autopilot's second of delay
 (0.7 m beyond at 1 m/s) is used up before the floor."""
 _CREEP_M_S = 0.3
-
-
-@dataclass(frozen=True)
-class Situation:
-    """What guidance needs to know of one moment."""
-
-    stamp_ns: int
-    """Of the heatmap that the choice rests on."""
-    pose: Pose
-    site: Site | None
-    """None unless it is known and can be reached."""
-    at_safe_altitude: bool
-    ground_is_fresh: bool
-    """The ground under the vehicle was seen a moment ago and is safe."""
-    search_target: tuple[float, float] | None
-    """Where the search goes next (north, east); None while it looks."""
-    search_altitude_m: float
-    home: tuple[float, float] | None = None
-    """Where the landing began (north, east)."""
+_HIGHEST_SEARCH_M = 120.0
+_Wish = tuple[tuple[float, float, float], str]
+"""Speed to the north, to the east and down, and what motion waits for."""
+_STAND = (0.0, 0.0, 0.0)
 
 
 def over_site(pose: Pose, site: Site, radius_m: float) -> bool:
@@ -46,10 +32,11 @@ def velocity(
     state: State, situation: Situation, parameters: LandingParameters
 ) -> tuple[Setpoint, str]:
     """Return the wished set-point and what motion waits for (empty when for nothing)."""
-    fly = _FLIGHTS.get(state)
-    if fly is None:
-        return Setpoint(situation.stamp_ns), ''
-    return fly(situation, parameters)
+    stamp_ns, fly = situation.sighting.stamp_ns, _FLIGHTS.get(state)
+    if situation.pose is None or fly is None or state in STILL_STATES:
+        return Setpoint(stamp_ns), ''
+    (north, east, down), note = fly(situation.pose, situation, parameters)
+    return Setpoint(stamp_ns, north, east, down), note
 
 
 def _towards(
@@ -75,25 +62,33 @@ def _descent_speed(altitude_m: float, parameters: LandingParameters) -> float:
 
 
 def _down(
+    pose: Pose,
     situation: Situation,
     parameters: LandingParameters,
+    *,
     floor_m: float,
     tolerance_m: float,
     share: float,
 ) -> tuple[float, str]:
-    """Return the speed of descent towards a floor, and what it waits for."""
-    site, pose = situation.site, situation.pose
-    room_m = pose.altitude_agl_m - floor_m
+    """Return the speed of descent towards a floor, and what it waits for.
+
+    Args:
+        pose: Of the vehicle.
+        situation: With the site below.
+        parameters: Speeds.
+        floor_m: Altitude at which the descent ends.
+        tolerance_m: Distance to the middle of the site from which on nothing descends.
+        share: Of the usual speed.
+    """
+    site, room_m = situation.site, pose.altitude_agl_m - floor_m
     if site is None or room_m <= 0.0:
         return 0.0, ''
-    if not situation.ground_is_fresh:
+    if not situation.sighting.ground_is_fresh:
         return 0.0, 'waiting for a fresh look at the ground below'
     error_m = site.distance_m(pose)
     if tolerance_m <= 0.0 or error_m >= tolerance_m:
-        return (
-            0.0,
-            f'{error_m:.1f} m beside the site: descends within {max(tolerance_m, 0.0):.1f} m',
-        )
+        limit_m = max(tolerance_m, 0.0)
+        return 0.0, f'{error_m:.1f} m beside the site: descends within {limit_m:.1f} m'
     # Full speed within half of the tolerance, none at its edge.
     centred = min(1.0, 2.0 * (1.0 - error_m / tolerance_m))
     speed = share * _descent_speed(pose.altitude_agl_m, parameters) * centred
@@ -101,65 +96,67 @@ def _down(
 
 
 def _lateral_to_site(
-    situation: Situation, parameters: LandingParameters, gain: float, limit_m_s: float
+    pose: Pose, site: Site | None, parameters: LandingParameters, gain: float
 ) -> tuple[float, float]:
-    site, pose = situation.site, situation.pose
+    limit_m_s = parameters.lateral_speed_limit
     if site is None:
         return 0.0, 0.0
-    if not situation.at_safe_altitude:
+    if not at_safe_altitude(pose, parameters):
         if site.distance_m(pose) > site.clearance_m:
             return 0.0, 0.0
         limit_m_s = min(limit_m_s, parameters.landing_lateral_speed_limit)
     return _towards(pose, site.north_m, site.east_m, gain, limit_m_s)
 
 
-def _aim(situation: Situation, parameters: LandingParameters) -> tuple[Setpoint, str]:
+def _aim(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wish:
     p, site = parameters, situation.site
-    gain = p.gain * p.aiming_gain_mult
-    north, east = _lateral_to_site(situation, p, gain, p.lateral_speed_limit)
-    tolerance = 0.0 if site is None else site.clearance_m - p.safety_radius_m
-    down, note = _down(situation, p, p.aiming_floor * p.safe_altitude_m, tolerance, 0.5)
-    return Setpoint(situation.stamp_ns, north, east, down), note
+    north, east = _lateral_to_site(pose, site, p, p.gain * p.aiming_gain_mult)
+    tolerance_m = 0.0 if site is None else site.clearance_m - p.safety_radius_m
+    floor_m = p.aiming_floor * p.safe_altitude_m
+    down, note = _down(pose, situation, p, floor_m=floor_m, tolerance_m=tolerance_m, share=0.5)
+    return (north, east, down), note
 
 
-def _land(situation: Situation, parameters: LandingParameters) -> tuple[Setpoint, str]:
+def _land(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wish:
     p, site = parameters, situation.site
-    north, east = _lateral_to_site(situation, p, p.gain, p.lateral_speed_limit)
-    room = 0.0 if site is None else site.clearance_m - p.safety_radius_m
-    tolerance = min(max(0.5, 0.5 * room), room)
-    down, note = _down(situation, p, p.handover_altitude_m, tolerance, 1.0)
-    return Setpoint(situation.stamp_ns, north, east, down), note
+    north, east = _lateral_to_site(pose, site, p, p.gain)
+    room_m = 0.0 if site is None else site.clearance_m - p.safety_radius_m
+    tolerance_m = min(max(0.5, 0.5 * room_m), room_m)
+    floor_m = p.handover_altitude_m
+    down, note = _down(pose, situation, p, floor_m=floor_m, tolerance_m=tolerance_m, share=1.0)
+    return (north, east, down), note
 
 
-def _climb(situation: Situation, parameters: LandingParameters) -> tuple[Setpoint, str]:
-    return Setpoint(situation.stamp_ns, 0.0, 0.0, -parameters.z_speed_climbing), ''
+def _climb(_pose: Pose, _situation: Situation, parameters: LandingParameters) -> _Wish:
+    return (0.0, 0.0, -parameters.z_speed_climbing), ''
 
 
-def _search(situation: Situation, parameters: LandingParameters) -> tuple[Setpoint, str]:
-    """Look from higher up, then from elsewhere; only where lateral motion meets nothing."""
-    p, pose = parameters, situation.pose
-    if not situation.at_safe_altitude or situation.site is not None:
-        return Setpoint(situation.stamp_ns), 'looking'
-    missing_m = situation.search_altitude_m - pose.altitude_agl_m
+def _search(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wish:
+    """Look from higher up, then from elsewhere; only where lateral motion meets no obstacle."""
+    p = parameters
+    if not at_safe_altitude(pose, p) or situation.site is not None:
+        return _STAND, 'looking'
+    begun_m = (situation.home or pose).altitude_agl_m
+    missing_m = min(begun_m, _HIGHEST_SEARCH_M) - pose.altitude_agl_m
     up = min(p.z_speed_climbing, 0.5 * missing_m) if missing_m > 1.0 else 0.0
     if situation.search_target is None:
-        return Setpoint(situation.stamp_ns, 0.0, 0.0, -up), 'looking'
+        return (0.0, 0.0, -up), 'looking'
     north, east = _towards(pose, *situation.search_target, p.gain, p.search_speed)
-    return Setpoint(situation.stamp_ns, north, east, -up), 'flying an expanding square'
+    return (north, east, -up), 'flying an expanding square'
 
 
-def _return(situation: Situation, parameters: LandingParameters) -> tuple[Setpoint, str]:
-    """Up to where lateral motion meets nothing, then straight home."""
-    if situation.home is None:
-        return Setpoint(situation.stamp_ns), 'where the landing began is not known'
-    if not situation.at_safe_altitude:
-        return _climb(situation, parameters)
-    p = parameters
-    north, east = _towards(situation.pose, *situation.home, p.gain, p.search_speed)
-    return Setpoint(situation.stamp_ns, north, east), ''
+def _return(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wish:
+    """Up to where lateral motion meets no obstacle, then straight home."""
+    p, home = parameters, situation.home
+    if home is None:
+        return _STAND, 'where the landing began is not known'
+    if not at_safe_altitude(pose, p):
+        return _climb(pose, situation, p)
+    north, east = _towards(pose, home.north_m, home.east_m, p.gain, p.search_speed)
+    return (north, east, 0.0), ''
 
 
-_FLIGHTS: dict[State, Callable[[Situation, LandingParameters], tuple[Setpoint, str]]] = {
+_FLIGHTS: dict[State, Callable[[Pose, Situation, LandingParameters], _Wish]] = {
     State.AIMING: _aim,
     State.LANDING: _land,
     State.CLIMBING: _climb,

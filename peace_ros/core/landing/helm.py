@@ -8,15 +8,16 @@ sightings and telemetry before it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from math import hypot, inf
 
-from peace_ros.core.domain import Pose, Setpoint, Site, Telemetry
-from peace_ros.core.landing.guard import Guard, GuardInput
-from peace_ros.core.landing.guidance import ExpandingSquare, Situation, over_site, velocity
-from peace_ros.core.landing.lookout import LOOKING, Sighting
+from peace_ros.core.domain import Pose, Telemetry
+from peace_ros.core.landing.decision import Decision
+from peace_ros.core.landing.guard import Guard
+from peace_ros.core.landing.guidance import ExpandingSquare, over_site, velocity
 from peace_ros.core.landing.parameters import LandingParameters
-from peace_ros.core.landing.states import STILL_STATES, Events, State, next_state
+from peace_ros.core.landing.situation import Sighting, Situation
+from peace_ros.core.landing.states import LOOKING, Events, State, next_state
 from peace_ros.core.landing.watch import (
     Budget,
     ControlWatch,
@@ -29,25 +30,10 @@ from peace_ros.core.landing.watch import (
 _NS = 1e-9
 _AIMED_M = 1.0
 """AIMING has descended enough this close to its floor."""
-_HIGHEST_SEARCH_M = 120.0
 _HOME_M = 3.0
 """RETURNING has arrived within this."""
 _FENCE_MARGIN_M = 5.0
 """The search turns this far before the fence."""
-
-
-@dataclass(frozen=True)
-class Command:
-    """What a step decided to do."""
-
-    state: State
-    before: State
-    """The state until this step."""
-    reason: str
-    setpoint: Setpoint
-    guard_notes: tuple[str, ...]
-    outcome: str | None
-    time_in_state_s: float
 
 
 class Helm:
@@ -113,7 +99,7 @@ class Helm:
         telemetry_age_s: float,
         sighting: Sighting,
         last_rejection: str = '',
-    ) -> Command:
+    ) -> Decision:
         """Decide what to do now.
 
         Args:
@@ -131,74 +117,56 @@ class Helm:
         bad_data = bad_data or bad_map(sighting.map_age_s, last_rejection, p)
         site = None if bad_data else sighting.reachable
         if self._engaged:
-            self._keep_books(now_ns, telemetry, pose, sighting, bad_data)
-        before = self.state
-        self._advance(now_ns, self._events(pose, site, sighting, bad_data), sighting)
-        wish, note = self._guide(now_ns, pose, site, sighting)
-        home = None if self._home is None else (self._home.north_m, self._home.east_m)
-        given = GuardInput(
-            now_ns,
-            pose,
-            telemetry_age_s,
-            sighting.map_age_s,
-            home,
-            sighting.verdict.site,
-            sighting.ground_score,
-            sighting.ground_age_s,
-        )
-        setpoint, guard_notes = self._guard.limit(wish, given)
-        return Command(
+            self._home = self._home or pose
+        situation = Situation(now_ns, pose, telemetry_age_s, sighting, site, self._home)
+        if self._engaged:
+            self._keep_books(situation, telemetry, bad_data)
+        self._advance(situation, self._events(situation, bad_data))
+        situation = replace(situation, search_target=self._search_target(situation))
+        wish, note = velocity(self.state, situation, p)
+        setpoint, guard_notes = self._guard.limit(wish, situation)
+        relaxed = sighting.threshold < p.safety_threshold
+        notes = [note, f'threshold relaxed to {sighting.threshold:.2f}' if relaxed else '']
+        return Decision(
             state=self.state,
-            before=before,
-            reason=f'{self._reason}; {note}' if note else self._reason,
+            reason='; '.join(filter(None, (self._reason, *notes))),
             setpoint=setpoint,
+            verdict=sighting.verdict,
+            effective_threshold=sighting.threshold,
+            map_age_s=sighting.map_age_s,
+            focus=sighting.focus,
             guard_notes=guard_notes,
             outcome=self._outcome,
             time_in_state_s=self._time_in_state_s(now_ns),
+            relaxed=relaxed,
         )
 
     def _time_in_state_s(self, now_ns: int) -> float:
         since_ns = now_ns if self._since_ns is None else self._since_ns
         return max(0.0, (now_ns - since_ns) * _NS)
 
-    # --- state
-
-    def _keep_books(
-        self,
-        now_ns: int,
-        telemetry: Telemetry | None,
-        pose: Pose | None,
-        sighting: Sighting,
-        bad_data: str,
-    ) -> None:
+    def _keep_books(self, situation: Situation, telemetry: Telemetry | None, bad_data: str) -> None:
         self._control.see(telemetry)
-        if self._home is None and pose is not None:
-            self._home = pose
-        known = not bad_data and sighting.reachable is not None
         looking = self.state in LOOKING and not bad_data
-        self._budget.spend(now_ns, telemetry, looking=looking, site_known=known)
-        if self._has_nothing_left(pose, sighting, known=known, bad_data=bad_data):
+        site_known = situation.site is not None
+        self._budget.spend(situation.now_ns, telemetry, looking=looking, site_known=site_known)
+        if self._budget.policy_open and not bad_data and self._policy_is_done(situation):
             self._budget.finish_policy()
 
-    def _has_nothing_left(
-        self, pose: Pose | None, sighting: Sighting, *, known: bool, bad_data: str
-    ) -> bool:
-        """Tell whether the policy for a used-up budget is done."""
-        if not self._budget.policy_open or pose is None or bad_data:
-            return False
+    def _policy_is_done(self, situation: Situation) -> bool:
+        """Tell whether the policy for a used-up budget has nothing more to do."""
+        pose, home = situation.pose, situation.home
         if self._p.budget_policy == 'best_site':
-            return self.state in LOOKING and not known and sighting.best is None
-        home = self._home
-        if home is None:
+            nothing = situation.site is None and situation.sighting.best is None
+            return self.state in LOOKING and nothing
+        if pose is None or home is None:
             return True
         return hypot(home.north_m - pose.north_m, home.east_m - pose.east_m) <= _HOME_M
 
-    def _events(
-        self, pose: Pose | None, site: Site | None, sighting: Sighting, bad_data: str
-    ) -> Events:
-        p = self._p
+    def _events(self, situation: Situation, bad_data: str) -> Events:
+        p, pose, site = self._p, situation.pose, situation.site
         altitude_m = inf if pose is None else pose.altitude_agl_m
-        seen = sighting.revision - self._revision_at_state
+        seen = situation.sighting.revision - self._revision_at_state
         over, error_m = False, inf
         if pose is not None and site is not None:
             over, error_m = over_site(pose, site, p.safety_radius_m), site.distance_m(pose)
@@ -211,15 +179,15 @@ class Helm:
             bad_data=bad_data,
             site_known=site is not None,
             warmed_up=seen >= p.sensor_warm_up_cycles,
-            over_site=over and sighting.ground_is_fresh,
+            over_site=over and situation.sighting.ground_is_fresh,
             centred=error_m <= p.handover_error_m,
             at_safe_altitude=at_safe_altitude(pose, p),
             low_enough_to_land=altitude_m <= p.aiming_floor * p.safe_altitude_m + _AIMED_M,
             at_handover_altitude=altitude_m <= p.handover_altitude_m + p.handover_tolerance_m,
         )
 
-    def _advance(self, now_ns: int, events: Events, sighting: Sighting) -> None:
-        before = self.state
+    def _advance(self, situation: Situation, events: Events) -> None:
+        before, now_ns = self.state, situation.now_ns
         state, reason = next_state(before, events, self._time_in_state_s(now_ns), self._p)
         self._new_engagement = False
         self._reason = reason or self._reason
@@ -230,40 +198,18 @@ class Helm:
         }.get(state)
         if state is not before:
             self.state, self._since_ns = state, now_ns
-            self._revision_at_state = sighting.revision
+            self._revision_at_state = situation.sighting.revision
 
-    # --- motion
-
-    def _guide(
-        self, now_ns: int, pose: Pose | None, site: Site | None, sighting: Sighting
-    ) -> tuple[Setpoint, str]:
-        if pose is None or self.state in STILL_STATES:
-            return Setpoint(sighting.stamp_ns), ''
-        home = self._home or pose
-        situation = Situation(
-            stamp_ns=sighting.stamp_ns,
-            pose=pose,
-            site=site,
-            at_safe_altitude=at_safe_altitude(pose, self._p),
-            ground_is_fresh=sighting.ground_is_fresh,
-            search_target=self._search_target(now_ns, pose, home, sighting),
-            search_altitude_m=min(home.altitude_agl_m, _HIGHEST_SEARCH_M),
-            home=(home.north_m, home.east_m),
-        )
-        return velocity(self.state, situation, self._p)
-
-    def _search_target(
-        self, now_ns: int, pose: Pose, home: Pose, sighting: Sighting
-    ) -> tuple[float, float] | None:
-        p = self._p
-        if self.state not in LOOKING:
+    def _search_target(self, situation: Situation) -> tuple[float, float] | None:
+        p, pose, best = self._p, situation.pose, situation.sighting.best
+        if self.state not in LOOKING or pose is None:
             return None
-        if self._budget.outcome and sighting.best is not None:
-            return sighting.best.north_m, sighting.best.east_m
-        if self._time_in_state_s(now_ns) < p.search_hold_s:
+        if self._budget.outcome and best is not None:
+            return best.north_m, best.east_m
+        if self._time_in_state_s(situation.now_ns) < p.search_hold_s:
             return None
         if self._square is None:
-            radius_m = p.search_radius_m
+            radius_m, home = p.search_radius_m, self._home or pose
             if p.geofence_radius_m > 0.0:
                 radius_m = min(radius_m, max(0.0, p.geofence_radius_m - _FENCE_MARGIN_M))
             around = (home.north_m, home.east_m)

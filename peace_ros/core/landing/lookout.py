@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import hypot, inf
 
 from peace_ros.core.domain import Pose, Site
@@ -12,41 +11,14 @@ from peace_ros.core.landing.decision import Focus, Verdict
 from peace_ros.core.landing.memory import SiteMemory
 from peace_ros.core.landing.parameters import SAFETY_THRESHOLD_FLOOR, LandingParameters
 from peace_ros.core.landing.sites import Search, find_site, safe_ground
-from peace_ros.core.landing.states import State
+from peace_ros.core.landing.situation import Sighting
+from peace_ros.core.landing.states import LOOKING, State
 from peace_ros.core.landing.watch import at_safe_altitude
 from peace_ros.core.mapping import MapLayers, SafetyMap
 
 _NS = 1e-9
 _RENEW_S = 0.5
 """Without a new heatmap the map is judged again after this, because it ages."""
-LOOKING = frozenset({State.SEARCHING, State.RESTARTING})
-"""States that look for a site."""
-
-
-@dataclass(frozen=True)
-class Sighting:
-    """What the map says; everything that the decision needs of it."""
-
-    verdict: Verdict
-    reachable: Site | None
-    """The site of the verdict, unless the way to it is not known to be free."""
-    ground_is_fresh: bool
-    """The ground under the vehicle and its radius was safe when last judged, a moment ago."""
-    ground_score: float
-    """Worst score of the map under the vehicle and its radius now; 0 is unknown."""
-    ground_age_s: float
-    """Age of the oldest look at it."""
-    stamp_ns: int
-    """Of the newest heatmap in the map, 0 without one."""
-    map_age_s: float
-    """Its age, infinite without one."""
-    revision: int
-    """Number of heatmaps in the map."""
-    threshold: float
-    """Score from which ground counts as safe."""
-    focus: Focus | None = None
-    best: Site | None = None
-    """The best site of the engagement that has not failed, maybe out of view."""
 
 
 class Lookout:

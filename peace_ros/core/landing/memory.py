@@ -9,6 +9,7 @@ from math import hypot
 
 from peace_ros.core.domain import Site
 from peace_ros.core.landing.parameters import LandingParameters
+from peace_ros.core.landing.worth import Merits, worth
 
 _SAME_PLACE_M = 10.0
 _PLACES_LIMIT = 32
@@ -83,10 +84,9 @@ class SiteMemory:
         open_sites = [
             site for site in self._seen if not any(each.covers(site) for each in self._failed)
         ]
-        ample_m = self._p.ample_clearance_m
         return max(
             open_sites,
-            key=lambda site: min(site.clearance_m, ample_m) * site.confidence,
+            key=lambda site: float(worth(Merits(site.clearance_m, site.confidence), self._p)),
             default=None,
         )
 

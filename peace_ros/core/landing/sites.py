@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, hypot, isfinite, pi
+from math import ceil, isfinite, pi
 from typing import cast
 
 import cv2
@@ -19,12 +19,16 @@ from peace_ros.core.landing.parameters import (
     SAFETY_THRESHOLD_FLOOR,
     LandingParameters,
 )
+from peace_ros.core.landing.worth import Merits, worth
 from peace_ros.core.mapping import MapLayers
 
 _KEEP_FRACTION = 0.85
 """A chosen site may lose this part of the required clearance before it is given up."""
 _REFINE_RADIUS_M = 6.0
 """A chosen site moves towards the best place within this distance."""
+_REFINE_WAY = 0.125
+"""Weight of that distance: enough that a site does not drift over a large field, too little to keep
+it from the middle of its ground."""
 
 
 @dataclass(frozen=True)
@@ -85,10 +89,10 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
 
     The layers need to reach only as far beyond the focus as clearance counts.
     """
+    p = parameters
     if layers.score.size == 0:
         return Verdict.no_zone('the focus lies outside of the map')
-    safe = safe_ground(layers, search.threshold, search.age_limit_s, parameters.min_looks)
-    ground = _Ground(layers, safe, clearance(safe, layers.cell_m))
+    safe = safe_ground(layers, search.threshold, search.age_limit_s, p.min_looks)
     inside = layers.disc(search.focus.north_m, search.focus.east_m, search.focus.radius_m)
     if not safe[inside].any():
         known = bool((layers.looks[inside] > 0).any())
@@ -97,7 +101,8 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
         )
     for north, east, radius in search.failed:
         inside &= ~layers.disc(north, east, radius)
-    kept = _keep(ground, search, inside, parameters)
+    ground = _Ground(layers, safe, clearance(safe, layers.cell_m))
+    kept = _keep(ground, search, inside, p)
     wide = inside & (ground.clearance_m >= search.required_clearance_m)
     if not wide.any():
         if kept is not None:
@@ -108,76 +113,43 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
             f'{search.required_clearance_m:.1f} m are needed'
             + (', sites that failed left out' if search.failed else '')
         )
-    preferred = wide & (ground.clearance_m >= parameters.preferred_clearance_m)
-    value = _value(ground, preferred if preferred.any() else wide, search, parameters)
-    best = cast('tuple[int, int]', np.unravel_index(int(np.argmax(value)), value.shape))
-    best_at = layers.centre_of(*best)
-    if kept is not None:
-        kept_cell = layers.cell_at(*kept)
-        reference = 0.0 if kept_cell is None else _worth(ground, kept_cell, search, parameters)
-        challenger = _worth(ground, best, search, parameters)
-        if challenger < parameters.site_hysteresis * reference:
-            return Verdict.found(_site_at(ground, *kept))
-    return Verdict.found(_site_at(ground, *best_at))
+    preferred = wide & (ground.clearance_m >= p.preferred_clearance_m)
+    value = worth(_merits(ground, search, inside), p)
+    best = _highest(value, preferred if preferred.any() else wide)
+    kept_cell = None if kept is None else layers.cell_at(*kept)
+    if kept is None or kept_cell is None or value[best] >= p.site_hysteresis * value[kept_cell]:
+        kept = layers.centre_of(*best)
+    return Verdict.found(_site_at(ground, *kept))
 
 
-def _value(
-    ground: _Ground,
-    candidates: NDArray[np.bool_],
-    search: Search,
-    parameters: LandingParameters,
-) -> NDArray[np.float32]:
-    """Return the worth of every candidate cell, 0 elsewhere.
+def _highest(value: NDArray[np.float32], candidates: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return the candidate cell of the highest value."""
+    index = int(np.argmax(np.where(candidates, value, np.float32(-1.0))))
+    return cast('tuple[int, int]', np.unravel_index(index, value.shape))
 
-    In the spirit of DOVESEI's area / perimeter / (distance + 1) per contour: large and compact
-    components rather than small and thin ones, near ones rather than far ones, and within them
-    clearance up to what is ample, and confidence.
+
+def _merits(ground: _Ground, search: Search, inside: NDArray[np.bool_]) -> Merits:
+    """Return the merits of every cell, as seen from the vehicle.
+
+    Shapes are those of the connected ground with enough clearance to keep a site, so that the
+    present choice and its rivals are measured alike.
     """
-    _, labels = cv2.connectedComponents(candidates.astype(np.uint8), connectivity=4)
-    north, east = ground.layers.distances_m(search.pose.north_m, search.pose.east_m)
-    distance = np.sqrt(north * north + east * east)
-    worth = np.minimum(ground.clearance_m, parameters.ample_clearance_m)
-    worth = worth * _shapes(candidates, labels, ground.layers.cell_m)[labels]
-    worth = worth * _confidence(ground.layers, search.required_clearance_m)
-    worth = worth / (1.0 + distance / parameters.distance_scale_m)
-    result: NDArray[np.float32] = np.where(candidates, worth, np.float32(0.0)).astype(np.float32)
-    return result
-
-
-def _shapes(
-    candidates: NDArray[np.bool_], labels: NDArray[np.int32], cell_m: float
-) -> NDArray[np.float32]:
-    """Return a factor below 1 per component: half width (area / perimeter) and compactness.
-
-    Compactness is the isoperimetric quotient, 1 for a disc; it weighs little, since a long lawn
-    is as safe as a round one of its width.
-    """
-    inner = cv2.erode(candidates.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    layers = ground.layers
+    usable = inside & (ground.clearance_m >= _KEEP_FRACTION * search.required_clearance_m)
+    _, labels = cv2.connectedComponents(usable.astype(np.uint8), connectivity=4)
+    inner = cv2.erode(usable.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     area = np.bincount(labels.ravel())
-    rim = np.maximum(np.bincount(labels[candidates & ~inner], minlength=area.size), 1)
-    half_width_m = area / rim * cell_m
-    compact = np.minimum(1.0, 4.0 * pi * area / (rim * rim))
-    factor = (half_width_m + 1.0) / (half_width_m + 4.0) * (0.8 + 0.2 * compact)
-    return cast('NDArray[np.float32]', factor.astype(np.float32))
-
-
-def _confidence(layers: MapLayers, radius_m: float) -> NDArray[np.float32]:
-    """Return the mean safety score around every cell, squared: doubt costs more than distance."""
-    size = 2 * ceil(radius_m / layers.cell_m) + 1
-    mean = cv2.blur(layers.score, (size, size), borderType=cv2.BORDER_REPLICATE)
-    return cast('NDArray[np.float32]', mean * mean)
-
-
-def _worth(
-    ground: _Ground, cell: tuple[int, int], search: Search, parameters: LandingParameters
-) -> float:
-    """Return the worth of one cell without the shape of its component, to compare two choices."""
-    north, east = ground.layers.centre_of(*cell)
-    distance = hypot(north - search.pose.north_m, east - search.pose.east_m)
-    enough = min(float(ground.clearance_m[cell]), parameters.ample_clearance_m)
-    near = ground.layers.disc(north, east, search.required_clearance_m)
-    confidence = float(ground.layers.score[near].mean())
-    return enough * confidence**2 / (1.0 + distance / parameters.distance_scale_m)
+    rim = np.maximum(np.bincount(labels[usable & ~inner], minlength=area.size), 1)
+    compactness = np.minimum(1.0, 4.0 * pi * area / (rim * rim))
+    size = 2 * ceil(search.required_clearance_m / layers.cell_m) + 1
+    confidence = cv2.blur(layers.score, (size, size), borderType=cv2.BORDER_REPLICATE)
+    return Merits(
+        clearance_m=ground.clearance_m,
+        confidence=cast('NDArray[np.float32]', confidence),
+        half_width_m=(area / rim * layers.cell_m).astype(np.float32)[labels],
+        compactness=compactness.astype(np.float32)[labels],
+        distance_m=np.hypot(*layers.distances_m(search.pose.north_m, search.pose.east_m)),
+    )
 
 
 def _keep(
@@ -185,8 +157,8 @@ def _keep(
 ) -> tuple[float, float] | None:
     """Return where the present choice is now (north, east), None when it is lost.
 
-    It moves a part of the way towards the widest place near by, so that it follows the map
-    without jumping.
+    It moves a part of the way towards the best place near by, so that it follows the map without
+    jumping. All of that is the same safe ground: width and nearness decide.
     """
     site = search.incumbent
     if site is None:
@@ -195,12 +167,9 @@ def _keep(
     near = inside & ground.layers.disc(site.north_m, site.east_m, _REFINE_RADIUS_M)
     if not near.any():
         return None
-    enough = np.minimum(ground.clearance_m, parameters.ample_clearance_m)
-    # Among equally wide places the nearest one: no drift over a large field.
-    north, east = ground.layers.distances_m(site.north_m, site.east_m)
-    value = np.where(near, enough - 0.05 * np.sqrt(north * north + east * east), -1.0)
-    best = np.unravel_index(int(np.argmax(value)), value.shape)
-    best_north, best_east = ground.layers.centre_of(int(best[0]), int(best[1]))
+    way_m = np.hypot(*ground.layers.distances_m(site.north_m, site.east_m))
+    value = worth(Merits(ground.clearance_m, distance_m=_REFINE_WAY * way_m), parameters)
+    best_north, best_east = ground.layers.centre_of(*_highest(value, near))
     step = parameters.focus_step
     moved = (
         site.north_m + step * (best_north - site.north_m),

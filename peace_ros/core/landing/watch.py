@@ -55,25 +55,34 @@ class ControlWatch:
         self._was_armed |= telemetry.armed
 
 
-def bad_telemetry(telemetry: Telemetry | None, age_s: float, parameters: LandingParameters) -> str:
-    """Return what is wrong with telemetry in a sentence, empty when it can be trusted."""
+def bad_vehicle(telemetry: Telemetry | None, age_s: float, parameters: LandingParameters) -> str:
+    """Return why the vehicle does not fly at a known, valid position, empty when it does."""
     p = parameters
     if telemetry is None or telemetry.pose is None:
-        silent = 'the autopilot has not said where it is: check its streams'
+        silent = 'no telemetry: the autopilot has not said where it is; check its streams'
         return silent if telemetry is None else telemetry.position_problem or silent
     if not age_s <= p.telemetry_age_limit_s:
-        return f'telemetry is {age_s:.1f} s old, limit {p.telemetry_age_limit_s:.1f} s'
+        limit_s = p.telemetry_age_limit_s
+        return f'telemetry is {age_s:.1f} s old, limit {limit_s:.1f} s: check the connection'
+    if not telemetry.armed:
+        return 'the vehicle is not armed: it must be in the air'
+    if telemetry.landed:
+        return 'the vehicle is on the ground: it must be in the air'
     pose = telemetry.pose
     if valid_pose(telemetry, p) is None:
         return (
             f'position {pose.north_m:.1f}, {pose.east_m:.1f} m at {pose.altitude_agl_m:.1f} m '
             f'above ground is not valid: altitude must lie within 0 to {p.altitude_limit_m:.0f} m'
         )
-    if not telemetry.armed or telemetry.landed:
-        return 'the vehicle is not in the air'
-    if not telemetry.in_control:
-        return f'the autopilot obeys mode {telemetry.mode or "unknown"}, not us'
     return ''
+
+
+def bad_telemetry(telemetry: Telemetry | None, age_s: float, parameters: LandingParameters) -> str:
+    """Return why set-points must stop for what telemetry says, empty when they may go on."""
+    problem = bad_vehicle(telemetry, age_s, parameters)
+    if not problem and telemetry is not None and not telemetry.in_control:
+        return f'the autopilot is in mode {telemetry.mode or "unknown"}, in which it ignores us'
+    return problem
 
 
 def bad_map(map_age_s: float, last_rejection: str, parameters: LandingParameters) -> str:
@@ -81,10 +90,12 @@ def bad_map(map_age_s: float, last_rejection: str, parameters: LandingParameters
     limit = parameters.heatmap_age_limit_s
     if map_age_s <= limit:
         return ''
-    why = f'; the last one was rejected: {last_rejection}' if last_rejection else ''
+    why = f'the last one was rejected: {last_rejection}' if last_rejection else ''
     if not isfinite(map_age_s):
-        return f'no heatmap has come yet{why}'
-    return f'the newest heatmap is {map_age_s:.1f} s old, limit {limit:.1f} s{why}'
+        why = why or 'is segmentation running, with the same clock?'
+        return f'no heatmap yet: {why}'
+    why = why or 'is segmentation running?'
+    return f'the newest heatmap is {map_age_s:.1f} s old, limit {limit:.1f} s: {why}'
 
 
 class Budget:

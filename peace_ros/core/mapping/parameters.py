@@ -14,20 +14,12 @@ from peace_ros.core.domain.parameters import check, parameter
 class MapParameters:
     """Size, evidence and memory of a :class:`~peace_ros.core.mapping.SafetyMap`."""
 
-    map_cell_m: float = parameter(0.5, 'Edge of a map cell.', unit='m', low=0.1, high=5.0)
+    map_cell_m: float = parameter(0.5, 'Edge of a map cell.', low=0.1, high=5.0)
     map_size_m: float = parameter(
-        240.0,
-        'Edge of the square window that follows the vehicle.',
-        unit='m',
-        low=20.0,
-        high=1000.0,
+        240.0, 'Edge of the square window that follows the vehicle.', low=20.0, high=1000.0
     )
     neutral_score: float = parameter(
-        0.5,
-        'Heatmap value that speaks neither for safe nor for unsafe; heatmaps are calibrated so '
-        'that it is 0.5.',
-        low=0.05,
-        high=0.95,
+        0.5, 'Heatmap value that is evidence for neither safe nor unsafe.', low=0.05, high=0.95
     )
     look_limit: float = parameter(
         1.5, 'Largest evidence of one look, in log-odds.', unit='nat', low=0.1, high=5.0
@@ -43,106 +35,92 @@ class MapParameters:
     )
     repeat_limit: float = parameter(
         5.0,
-        'Repeated looks of the same strength add up to at most this many of them, because '
-        'frames of one scene are not independent.',
+        'Equal looks at one place count at most as this many independent ones.',
         low=1.0,
         high=20.0,
     )
     independent_after_s: float = parameter(
-        0.4, 'Frames closer in time than this count less.', unit='s', low=0.0, high=10.0
+        0.4, 'Frames closer in time than this count less.', low=0.0, high=10.0
     )
     safe_half_life_s: float = parameter(
-        20.0, 'Evidence for safe halves in this time.', unit='s', low=1.0, high=600.0
+        20.0, 'Evidence for safe halves in this time.', low=1.0, high=600.0
     )
     unsafe_half_life_s: float = parameter(
-        60.0, 'Evidence for unsafe halves in this time.', unit='s', low=1.0, high=3600.0
+        60.0, 'Evidence for unsafe halves in this time.', low=1.0, high=3600.0
     )
     border_fraction: float = parameter(
-        0.03, 'Part of the image at each edge that is not believed.', low=0.0, high=0.4
+        0.03, 'Part of the image at each edge that is ignored.', low=0.0, high=0.4
     )
     off_nadir_limit_deg: float = parameter(
-        60.0, 'Rays that slant more than this are not believed.', unit='deg', low=5.0, high=80.0
+        60.0, 'Rays that slant more than this are ignored.', low=5.0, high=80.0
     )
 
     tilt_limit_deg: float = parameter(
-        40.0,
-        'Frames taken while the camera leans more than this are refused.',
-        unit='deg',
-        low=5.0,
-        high=80.0,
+        40.0, 'Frames are rejected while the camera tilts more than this.', low=5.0, high=80.0
     )
     fine_memory_s: float = parameter(
         60.0,
-        'The resolution at which a cell was seen counts half after this: until then a coarser '
-        'look cannot call ground safe that a finer one called unsafe.',
-        unit='s',
+        'Half-life of the resolution of a cell: until then a coarser look cannot make ground safe '
+        'that a finer look called unsafe.',
         low=1.0,
         high=3600.0,
     )
     # What moves in
     veto_score: float = parameter(
         0.25,
-        'A heatmap value up to this is clearly unsafe and closes the ground at once.',
+        'A heatmap value up to this is clearly unsafe and closes ground at once.',
         low=0.0,
         high=0.45,
     )
     veto_blob_m: float = parameter(
         0.3,
-        'Smallest width of a clearly unsafe blob that closes ground (a person from above); never '
-        'less than two pixels.',
-        unit='m',
+        'Smallest width of a clearly unsafe blob that closes ground (a person from above); at '
+        'least two pixels.',
         low=0.0,
         high=5.0,
     )
     veto_pixel_m: float = parameter(
         0.35,
-        'Heatmap pixels that are larger on the ground close nothing at once, for they cannot '
-        'tell a person from noise; their evidence still counts.',
-        unit='m',
+        'With larger pixels on the ground nothing is closed at once: they do not tell a person '
+        'from noise. Their evidence still counts.',
         low=0.01,
         high=5.0,
     )
     clear_score: float = parameter(
-        0.6, 'A look with at least this heatmap value counts towards opening.', low=0.5, high=0.95
+        0.6,
+        'A look of at least this heatmap value helps to open closed ground.',
+        low=0.5,
+        high=0.95,
     )
     veto_looks: int = parameter(
         3, 'Looks that open closed ground again, none of them coarser.', low=1, high=100
     )
     veto_s: float = parameter(
         1.0,
-        'Ground stays closed for this long after the last clearly unsafe look, times the number '
-        'of such looks since it was open (up to 5).',
-        unit='s',
+        'Ground stays closed this long after the last clearly unsafe look, times the number of '
+        'such looks (up to 5).',
         low=0.0,
         high=120.0,
     )
     # Flatness, where depth is given
     depth_smoothness_m: float = parameter(
         0.5,
-        'Ground whose heights spread by more than this standard deviation is closed until it is '
-        'measured flat; only where depth is given (DOVESEI: 0.5).',
-        unit='m',
+        'With depth: ground is closed while its heights deviate by more than this (DOVESEI: 0.5).',
         low=0.01,
         high=10.0,
     )
     depth_range_m: float = parameter(
         20.0,
-        'Depths from here on are those of a sensor that sees no farther, and are ignored '
-        '(DOVESEI: 20).',
-        unit='m',
+        'With depth: range of the sensor; larger values are ignored (DOVESEI: 20).',
         low=0.5,
         high=200.0,
     )
     flat_width_m: float = parameter(
-        3.0, 'Width of the ground over which heights are compared.', unit='m', low=0.5, high=20.0
+        3.0, 'With depth: width of the ground over which heights are compared.', low=0.5, high=20.0
     )
     # Without position
     position_gap_limit_s: float = parameter(
-        3.0,
-        'The map is dropped when for this long nothing said where the vehicle is.',
-        unit='s',
-        low=0.5,
-        high=60.0,
+        3.0, 'The map is dropped when the position is unknown for this long.', low=0.5, high=60.0
     )
 
     def __post_init__(self) -> None:

@@ -1,10 +1,10 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Sequences of anything that can happen, put before the helm; every command is held to promises.
+"""Random sequences of steps for the helm; every decision is checked against promises.
 
 ``python -m peace_ros.lab.evaluation.sequences --sequences 100000`` runs the full number. A sequence
-begins in any state with any policy; its moments draw data, good or bad, independently of each
-other, so that they need not be physical: altitude jumps, the map lies, a pilot comes and goes.
+begins in any state with any policy; each step draws good or bad data independently of the others,
+so that a sequence need not be physical: altitude jumps, the map lies, a pilot comes and goes.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from typing import Any, NamedTuple, get_type_hints
 import numpy as np
 
 from peace_ros.core.domain import Pose, Site, Telemetry
-from peace_ros.core.landing.decision import Verdict
+from peace_ros.core.landing.decision import Decision, Verdict
 from peace_ros.core.landing.guidance import over_site
-from peace_ros.core.landing.helm import Command, Helm
-from peace_ros.core.landing.lookout import Sighting
+from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.parameters import CELL_SCORE_FLOOR, LandingParameters
+from peace_ros.core.landing.situation import Sighting
 from peace_ros.core.landing.states import STILL_STATES, TRANSITIONS, State
 from peace_ros.core.landing.watch import at_safe_altitude, valid_pose
 
@@ -103,12 +103,12 @@ PARAMETERS = tuple(
 
 @dataclass
 class SequenceReport:
-    """What came of many sequences."""
+    """Result of many sequences."""
 
     sequences: int = 0
     moments: int = 0
     descents: int = 0
-    """Commands that went down: without any, nothing was tried."""
+    """Decisions to go down: without any, nothing was tested."""
     handovers: int = 0
     visits: Counter[str] = field(default_factory=Counter)
     """State -> moments in it."""
@@ -131,26 +131,27 @@ class Trial:
         self._had_control = self._home_set = False
         self._home_north_m = 0.0
 
-    def step(self, moment: SequenceStep, report: SequenceReport) -> Command:
-        """Put a moment before the helm, and the command that comes into the report."""
+    def step(self, moment: SequenceStep, report: SequenceReport) -> Decision:
+        """Give one step to the helm, and add its decision to the report."""
         self._act(moment)
         self._now_ns += round(moment.elapsed_s * 1e9)
         self._revision += moment.new_heatmaps
-        told = self._told(moment)
+        told, before = self._told(moment), self._helm.state
         seen = self._seen(moment, told)
-        command = self._helm.decide(self._now_ns, told, moment.telemetry_age_s, seen)
+        decision = self._helm.decide(self._now_ns, told, moment.telemetry_age_s, seen)
         report.moments += 1
-        report.visits[command.state.value] += 1
-        report.descents += command.setpoint.v_down_m_s > 0.0
-        if command.state is not command.before:
-            report.transitions[f'{command.before.value} > {command.state.value}'] += 1
-            report.handovers += command.state is State.HANDOVER
-            if moment.site_fails and command.state in {State.CLIMBING, State.RESTARTING}:
+        report.visits[decision.state.value] += 1
+        report.descents += decision.setpoint.v_down_m_s > 0.0
+        transition = f'{before.value} > {decision.state.value}'
+        if decision.state is not before:
+            report.transitions[transition] += 1
+            report.handovers += decision.state is State.HANDOVER
+            if moment.site_fails and decision.state in {State.CLIMBING, State.RESTARTING}:
                 self._helm.fail_attempt()
-        for promise in self._broken(moment, told, seen, command):
-            where = f'sequence {self._number}: {command.before.value} > {command.state.value}'
-            report.failures.append(f'{promise} ({where}, {moment}, {command.setpoint})')
-        return command
+        for promise in self._broken(moment, told, seen, before, decision):
+            where = f'sequence {self._number}: {transition}'
+            report.failures.append(f'{promise} ({where}, {moment}, {decision.setpoint})')
+        return decision
 
     def _act(self, moment: SequenceStep) -> None:
         self._engaged_now = moment.act == 'engage'
@@ -192,10 +193,15 @@ class Trial:
         )
 
     def _broken(
-        self, moment: SequenceStep, told: Telemetry, seen: Sighting, command: Command
+        self,
+        moment: SequenceStep,
+        told: Telemetry,
+        seen: Sighting,
+        before: State,
+        decision: Decision,
     ) -> Iterator[str]:
-        """Yield every promise that a command breaks."""
-        setpoint, state = command.setpoint, command.state
+        """Yield every promise that a decision breaks."""
+        setpoint, state = decision.setpoint, decision.state
         pose = valid_pose(told, self._p)
         v = (setpoint.v_north_m_s, setpoint.v_east_m_s, setpoint.v_down_m_s)
         if not all(map(isfinite, v)):
@@ -216,13 +222,13 @@ class Trial:
             site = seen.reachable
             if site is None or site.distance_m(pose) > site.clearance_m:
                 yield 'no lateral motion below the safe altitude but within the clearance'
-        if state is not command.before and state not in TRANSITIONS[command.before]:
+        if state is not before and state not in TRANSITIONS[before]:
             yield 'only transitions of the table happen'
-        if not command.reason:
+        if not decision.reason:
             yield 'every decision has a reason'
-        if state is State.HANDOVER and command.before is not State.HANDOVER:
+        if state is State.HANDOVER and before is not State.HANDOVER:
             yield from self._broken_by_handover(pose, seen)
-        yield from self._broken_by_takeover(told, command)
+        yield from self._broken_by_takeover(told, before, state)
         yield from self._broken_by_fence(pose, setpoint.v_north_m_s)
 
     def _broken_by_descent(
@@ -247,13 +253,12 @@ class Trial:
         elif site.distance_m(pose) > p.handover_error_m or not seen.ground_is_fresh:
             yield 'never handed over beside the site or over ground not seen'
 
-    def _broken_by_takeover(self, told: Telemetry, command: Command) -> Iterator[str]:
-        was = command.before
-        if was is State.ABORTED and not self._engaged_now and command.state is not was:
+    def _broken_by_takeover(self, told: Telemetry, before: State, state: State) -> Iterator[str]:
+        if before is State.ABORTED and not self._engaged_now and state is not before:
             yield 'ABORTED is final until engaged again'
-        ended = was in {State.HANDOVER, State.ABORTED} or self._disengaged or self._engaged_now
+        ended = before in {State.HANDOVER, State.ABORTED} or self._disengaged or self._engaged_now
         taken = self._had_control and not told.in_control and not ended
-        if taken and command.state is not State.ABORTED:
+        if taken and state is not State.ABORTED:
             yield 'a take-over is ABORTED at once'
         self._had_control |= told.in_control and told.armed and not self._disengaged
 
@@ -284,7 +289,7 @@ def draw(random: np.random.Generator, sequences: int, length: int) -> Iterator[l
 def run(
     sequences: int, seed: int = 1, length: int = LENGTH, *, tell: bool = False
 ) -> SequenceReport:
-    """Run sequences from every state in turn and return what came of them."""
+    """Run sequences from every state in turn and return the report."""
     random, report, states = np.random.default_rng(seed), SequenceReport(), list(State)
     begun_s = monotonic()
     while report.sequences < sequences:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from peace_ros.core.domain import Camera, DepthImage, Heatmap, Pose, Site, Telemetry
 from peace_ros.core.landing import LandingCore, LandingParameters, State, Verdict, VerdictKind
 from peace_ros.core.landing.guidance import over_site
+from peace_ros.core.landing.situation import Situation
 from peace_ros.core.landing.states import STILL_STATES
 from peace_ros.core.mapping import MapParameters
 
@@ -220,7 +221,7 @@ def test_a_pose_that_is_not_finite_is_not_used(core):
         ({'pose': None}, 0.1, 'where it is'),
         ({'pose': pose_at(6.0, nan)}, 0.1, 'not valid'),
         ({'pose': pose_at(6.0, -3.0)}, 0.1, 'not valid'),
-        ({'landed': True}, 0.1, 'not in the air'),
+        ({'landed': True}, 0.1, 'on the ground'),
     ],
 )
 def test_bad_telemetry_stops_and_good_telemetry_goes_on(core, changes, age_s, word):
@@ -358,10 +359,10 @@ def test_a_site_counts_as_below_only_when_the_ground_was_just_seen(core):
     site = fed(core, 1.0, 6.0).site
     low = Pose(0, site.north_m, site.east_m, -30.0, LEVEL, 30.0)
     seen = core._lookout.look(6 * S, low, State.LANDING, 0.0)
-    fresh = replace(seen, ground_is_fresh=True)
-    assert core._helm._events(low, site, fresh, '').over_site
-    old = replace(seen, ground_is_fresh=False)
-    assert not core._helm._events(low, site, old, '').over_site
+    for is_fresh in (True, False):
+        sighting = replace(seen, ground_is_fresh=is_fresh)
+        known = Situation(6 * S, low, 0.1, sighting, site)
+        assert core._helm._events(known, '').over_site is is_fresh
 
 
 def test_below_the_safe_altitude_a_site_must_lie_around_the_vehicle(core):

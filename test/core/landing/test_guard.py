@@ -10,21 +10,36 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from peace_ros.core.domain import Pose, Setpoint, Site
-from peace_ros.core.landing import LandingParameters
-from peace_ros.core.landing.guard import Guard, GuardInput
+from peace_ros.core.landing import LandingParameters, Verdict
+from peace_ros.core.landing.guard import Guard
+from peace_ros.core.landing.situation import Sighting, Situation
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 P = LandingParameters(geofence_radius_m=50.0)
-ASIDE = Site(0.0, 4.6, 6.0, 100.0, 0.9, 0.1)
+HOME = Pose(0, 0.0, 0.0, -60.0, LEVEL, 60.0)
+NO_SITE = Verdict.no_zone('none')
+ASIDE = Verdict.found(Site(0.0, 4.6, 6.0, 100.0, 0.9, 0.1))
 
 
-def seen(altitude_m=60.0, north_m=0.0, now_ns=0, telemetry_age_s=0.1, map_age_s=0.1) -> GuardInput:
+def seen(altitude_m=60.0, north_m=0.0, now_ns=0, telemetry_age_s=0.1, **changes) -> Situation:
+    """Everything good, over a site at 0, 0; changes are those of the sighting."""
     pose = Pose(0, north_m, 0.0, -altitude_m, LEVEL, altitude_m)
-    below = Site(north_m, 0.0, 6.0, 100.0, 0.9, 0.1)
-    return GuardInput(now_ns, pose, telemetry_age_s, map_age_s, (0.0, 0.0), below, 0.9, map_age_s)
+    known = {
+        'verdict': Verdict.found(Site(north_m, 0.0, 6.0, 100.0, 0.9, 0.1)),
+        'reachable': None,
+        'ground_is_fresh': True,
+        'ground_score': 0.9,
+        'ground_age_s': changes.get('map_age_s', 0.1),
+        'stamp_ns': 0,
+        'map_age_s': 0.1,
+        'revision': 0,
+        'threshold': 0.8,
+    }
+    sighting = Sighting(**{**known, **changes})
+    return Situation(now_ns, pose, telemetry_age_s, sighting, home=HOME)
 
 
-def limited(wish: Setpoint, given_input: GuardInput, parameters=P):
+def limited(wish: Setpoint, given_input: Situation, parameters=P):
     """Ask often enough that the limit of growth is spent."""
     guard = Guard(parameters)
     for step in range(40):
@@ -51,7 +66,7 @@ def test_every_component_shrinks_towards_zero_and_limits_hold(
     guard, last, now_ns = Guard(P), (0.0, 0.0, 0.0), 0
     for number, wish in enumerate(wishes):
         before_ns, now_ns = now_ns, now_ns + step_ns
-        given_input = seen(altitude_m, north_m, now_ns, telemetry_age_s, map_age_s)
+        given_input = seen(altitude_m, north_m, now_ns, telemetry_age_s, map_age_s=map_age_s)
         out, notes = guard.limit(Setpoint(7, *wish), given_input)
         flown = (out.v_north_m_s, out.v_east_m_s, out.v_down_m_s)
         elapsed_s = 0.1 if number == 0 else min(0.5, max(0.0, (now_ns - before_ns) * 1e-9))
@@ -100,22 +115,22 @@ def test_a_calm_wish_passes_untouched():
         (Setpoint(0, 1.0, 0.0, 2.0), seen(altitude_m=nan), (1.0, 0.0, 0.0), 'altitude'),
         (Setpoint(0, 1.0, 0.0, 2.0), seen(map_age_s=1.6), (1.0, 0.0, 0.0), 'map'),
         (Setpoint(0, 1.0, 0.0, 2.0), seen(map_age_s=inf), (1.0, 0.0, 0.0), 'map'),
-        (Setpoint(0, 1.0, 0.0, 2.0), replace(seen(), site=None), (1.0, 0.0, 0.0), 'no site'),
-        (Setpoint(0, 1.0, 0.0, 2.0), replace(seen(), site=ASIDE), (1.0, 0.0, 0.0), 'no site'),
+        (Setpoint(0, 1.0, 0.0, 2.0), seen(verdict=NO_SITE), (1.0, 0.0, 0.0), 'no site'),
+        (Setpoint(0, 1.0, 0.0, 2.0), seen(verdict=ASIDE), (1.0, 0.0, 0.0), 'no site'),
         (
             Setpoint(0, 1.0, 0.0, 2.0),
-            replace(seen(), ground_score=0.4),
+            seen(ground_score=0.4),
             (1.0, 0.0, 0.0),
             'not safe',
         ),
         (
             Setpoint(0, 1.0, 0.0, 2.0),
-            replace(seen(), ground_score=nan),
+            seen(ground_score=nan),
             (1.0, 0.0, 0.0),
             'not safe',
         ),
-        (Setpoint(0, 1.0, 0.0, 2.0), replace(seen(), ground_age_s=2.0), (1.0, 0.0, 0.0), 'in view'),
-        (Setpoint(0, 1.0, 0.0, -2.0), replace(seen(), site=None), (1.0, 0.0, -2.0), ''),
+        (Setpoint(0, 1.0, 0.0, 2.0), seen(ground_age_s=2.0), (1.0, 0.0, 0.0), 'in view'),
+        (Setpoint(0, 1.0, 0.0, -2.0), seen(verdict=NO_SITE), (1.0, 0.0, -2.0), ''),
         (Setpoint(0, 1.0, 0.0, 1.0), seen(north_m=nan), (0.0, 0.0, 0.0), 'position'),
         (Setpoint(0, 1.0, 0.0, 2.0), seen(telemetry_age_s=0.8), (0.0, 0.0, 0.0), 'telemetry'),
         (Setpoint(0, 3.0, 0.0, 0.0), seen(north_m=51.0), (0.0, 0.0, 0.0), 'fence'),

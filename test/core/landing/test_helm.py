@@ -8,9 +8,9 @@ from math import hypot
 import pytest
 
 from peace_ros.core.domain import Pose, Setpoint, Site, Telemetry
-from peace_ros.core.landing import LandingParameters, State, Verdict
-from peace_ros.core.landing.helm import Command, Helm
-from peace_ros.core.landing.lookout import Sighting
+from peace_ros.core.landing import Decision, LandingParameters, State, Verdict
+from peace_ros.core.landing.helm import Helm
+from peace_ros.core.landing.situation import Sighting
 from peace_ros.core.landing.states import STILL_STATES
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -32,7 +32,7 @@ class Trip:
     battery: float | None = None
     state: State | None = None
     time_s: float = 0.0
-    log: list[Command] = field(default_factory=list)
+    log: list[Decision] = field(default_factory=list)
     lowest_m: float = 1e9
 
     def __post_init__(self) -> None:
@@ -63,7 +63,7 @@ class Trip:
             best=self.best,
         )
 
-    def step(self, **changes) -> Command:
+    def step(self, **changes) -> Decision:
         now_ns = round((100.0 + self.time_s) * 1e9)
         pose = Pose(now_ns, self.north_m, self.east_m, -self.altitude_m, LEVEL, self.altitude_m)
         told = Telemetry(
@@ -82,7 +82,7 @@ class Trip:
         self.lowest_m = min(self.lowest_m, self.altitude_m)
         self.time_s += STEP_S
 
-    def run(self, limit_s: float) -> Command:
+    def run(self, limit_s: float) -> Decision:
         command = self.step()
         while self.time_s < limit_s and command.outcome is None:
             command = self.step()

@@ -140,3 +140,146 @@ def test_places_that_failed_are_left_out():
     assert abs(find_site(layers, SEARCH, P).site.north_m) < 3.0
     again = find_site(layers, replace(SEARCH, failed=((0.0, 0.0, 8.0),)), P).site
     assert again.north_m > 30.0
+
+
+def layers_of_boxes(*boxes: tuple[float, float, float, float], score: float = 0.95) -> MapLayers:
+    """Safe boxes of ground: north and east of the middle, metres to the north and to the east."""
+    layers = layers_with()
+    for north_m, east_m, high_m, wide_m in boxes:
+        rows, columns = (
+            slice(round((at + 50.0 - size / 2) / 0.5), round((at + 50.0 + size / 2) / 0.5))
+            for at, size in ((north_m, high_m), (east_m, wide_m))
+        )
+        layers.score[rows, columns] = score
+    return layers
+
+
+# Of two places that are worth the same, the southern one comes first: the better lies in the north.
+@pytest.mark.parametrize(
+    ('layers', 'parameters'),
+    [
+        pytest.param(layers_with((-25.0, 0.0, 8.0), (25.0, 0.0, 9.0)), P, id='clearance'),
+        pytest.param(layers_with((-27.0, 0.0, 9.0), (24.0, 0.0, 9.0)), P, id='nearness'),
+        pytest.param(
+            layers_of_boxes((-25.0, 0.0, 28.0, 28.0), (25.0, 0.0, 28.0, 80.0)),
+            P,
+            id='width of the whole lawn',
+        ),
+        pytest.param(
+            layers_of_boxes((-25.0, 0.0, 17.0, 61.0), (25.0, 0.0, 24.0, 24.0)),
+            replace(P, ample_clearance_m=6.0, distance_scale_m=1000.0),
+            id='compactness',
+        ),
+    ],
+)
+def test_each_criterion_decides_between_places_that_are_else_alike(layers, parameters):
+    assert find_site(layers, SEARCH, parameters).site.north_m > 0.0
+
+
+def test_the_surer_of_two_equal_places_is_chosen():
+    layers = layers_with((-25.0, 0.0, 9.0), (25.0, 0.0, 9.0))
+    layers.score[:100][layers.score[:100] > 0.5] = 0.9
+    assert find_site(layers, SEARCH, P).site.north_m > 0.0
+    sure = find_site(layers_with((-25.0, 0.0, 9.0), (25.0, 0.0, 9.0)), SEARCH, P).site
+    assert sure.north_m < 0.0, 'of equal ones the first'
+
+
+def test_ground_below_the_preferred_clearance_counts_only_where_there_is_no_wider():
+    narrow_near, wide_far = (-3.0, 0.0, 6.0), (40.0, 0.0, 7.5)
+    far = replace(SEARCH, pose=replace(SEARCH.pose, north_m=-3.0))
+    assert find_site(layers_with(narrow_near, wide_far), far, P).site.north_m > 30.0
+    modest = replace(P, preferred_clearance_m=4.0)
+    assert find_site(layers_with(narrow_near, wide_far), far, modest).site.north_m < 0.0
+
+
+@pytest.mark.parametrize(('hysteresis', 'stays'), [(1.0, False), (1.3, True), (10.0, True)])
+def test_a_rival_must_be_worth_the_hysteresis_times_the_present_choice(hysteresis, stays):
+    layers = layers_with((0.0, 20.0, 8.0), (0.0, -20.0, 9.0))
+    search = replace(SEARCH, incumbent=Site(0.0, 20.0, 7.5, 200.0, 0.95, 0.0))
+    site = find_site(layers, search, replace(P, site_hysteresis=hysteresis)).site
+    assert (site.east_m > 0.0) is stays
+
+
+def test_a_rival_is_measured_with_the_shape_of_its_ground_too():
+    """A choice in the middle of a lawn is not given up for a long strip of its width."""
+    layers = layers_of_boxes((0.0, 25.0, 15.0, 60.0), (0.0, -32.0, 30.0, 30.0))
+    search = replace(SEARCH, incumbent=Site(0.0, 25.0, 7.0, 900.0, 0.95, 0.0))
+    assert find_site(layers, search, P).site.east_m < 0.0
+
+
+def test_a_choice_is_kept_down_to_85_percent_of_the_clearance_it_needs():
+    search = replace(SEARCH, incumbent=Site(0.25, 0.25, 3.2, 40.0, 0.95, 0.0))
+    for radius_m, kind in ((2.8, VerdictKind.NO_ZONE), (3.4, VerdictKind.SITE)):
+        layers = layers_with((0.25, 0.25, radius_m))
+        verdict = find_site(layers, search, P)
+        assert verdict.kind is kind
+        assert find_site(layers, replace(search, incumbent=None), P).kind is VerdictKind.NO_ZONE
+
+
+@pytest.mark.parametrize('step', [0.1, 0.5, 1.0])
+def test_a_choice_moves_by_the_focus_step_towards_the_middle_of_its_ground(step):
+    search = replace(SEARCH, incumbent=Site(0.25, 1.25, 6.0, 250.0, 0.95, 0.0))
+    site = find_site(layers_with((0.25, 0.25, 9.0)), search, replace(P, focus_step=step)).site
+    assert (site.north_m, site.east_m) == pytest.approx((0.25, 1.25 - step))
+
+
+def test_a_choice_does_not_drift_over_a_large_field():
+    search = replace(SEARCH, incumbent=Site(5.25, -4.75, 12.0, 4000.0, 0.95, 0.0))
+    site = find_site(layers_with((0.0, 0.0, 40.0)), search, P).site
+    assert (site.north_m, site.east_m) == (5.25, -4.75)
+
+
+def test_a_site_tells_of_its_ground_what_the_map_shows():
+    layers = layers_of_boxes((0.0, 0.0, 20.0, 30.0), (30.0, 30.0, 8.0, 8.0))
+    layers.age_s[:] = 1.5
+    site = find_site(layers, SEARCH, P).site
+    # Its rim is not safe: the mean over 3 x 3 cells is too low there.
+    assert site.area_m2 == 19.0 * 29.0
+    assert site.clearance_m == pytest.approx(9.25, abs=0.05)
+    assert site.confidence == pytest.approx(0.95)
+    assert site.age_s == 1.5
+
+
+@pytest.mark.parametrize(('north_m', 'word'), [(0.0, 'no ground in the focus is safe'), (40.0, '')])
+def test_says_whether_ground_is_unsafe_or_not_known(north_m, word):
+    layers = layers_with()
+    layers.looks[100:] = 0
+    focus = Focus(-40.0 + north_m * 2.0, 0.0, 8.0)
+    reason = find_site(layers, replace(SEARCH, focus=focus), P).reason
+    assert reason == (word or 'nothing is known yet')
+
+
+def test_says_that_the_focus_lies_outside_of_the_map():
+    empty = np.zeros((0, 0), np.float32)
+    layers = MapLayers(empty, empty, empty.astype(np.uint16), 0.5, 0.0, 0.0)
+    assert find_site(layers, SEARCH, P).reason == 'the focus lies outside of the map'
+    assert safe_ground(layers, 0.8, 10.0, 3).shape == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ('change', 'is_safe'),
+    [
+        ({}, True),
+        ({'looks': 3}, True),
+        ({'looks': 2}, False),
+        ({'age_s': 10.0}, True),
+        ({'age_s': 10.1}, False),
+        ({'score': 0.8}, True),
+        ({'score': 0.79}, False),
+    ],
+)
+def test_the_bounds_of_safe_ground_are_inclusive(change, is_safe):
+    layers = layers_with(score=0.0)
+    values = {'score': 0.9, 'age_s': 0.0, 'looks': 9, **change}
+    for name, value in values.items():
+        getattr(layers, name)[:] = value
+    safe = safe_ground(layers, float(np.float32(0.8)), 10.0, 3)
+    assert safe.all() == safe.any() == is_safe
+
+
+@pytest.mark.parametrize(('score', 'is_safe'), [(0.5, True), (0.49, False)])
+def test_a_cell_is_an_obstacle_below_one_half_whatever_surrounds_it(score, is_safe):
+    layers = layers_with((0.0, 0.0, 20.0), score=1.0)
+    layers.score[100, 100] = score
+    assert safe_ground(layers, 0.8, 10.0, 3)[100, 100] == is_safe
+    assert safe_ground(layers, 0.8, 10.0, 3)[100, 102]

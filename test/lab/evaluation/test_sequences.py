@@ -74,7 +74,7 @@ def test_a_guard_with_a_rule_taken_out_is_noticed(monkeypatch, rule, promise):
 
 
 def test_a_core_that_flies_where_it_must_stand_is_noticed(monkeypatch):
-    monkeypatch.setattr('peace_ros.core.landing.helm.STILL_STATES', frozenset())
+    monkeypatch.setattr('peace_ros.core.landing.guidance.STILL_STATES', frozenset())
     monkeypatch.setitem(guidance._FLIGHTS, State.HOLD, guidance._climb)
     assert any('zero is zero' in each for each in run(500).failures)
 

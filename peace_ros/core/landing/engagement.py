@@ -1,0 +1,35 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a landing may begin: the policy behind the engage service."""
+
+from __future__ import annotations
+
+from peace_ros.core.domain import Telemetry
+from peace_ros.core.landing.parameters import LandingParameters
+from peace_ros.core.landing.states import State
+from peace_ros.core.landing.watch import bad_map, bad_vehicle
+
+_MAY_BEGIN = frozenset({State.IDLE, State.HOLD, State.HANDOVER, State.ABORTED})
+
+
+def engagement_problem(
+    state: State,
+    telemetry: Telemetry | None,
+    telemetry_age_s: float,
+    map_age_s: float,
+    parameters: LandingParameters,
+) -> str:
+    """Return a sentence why a landing cannot begin now, empty when it can.
+
+    Control of the vehicle is no condition: it is requested after this check.
+
+    Args:
+        state: Of the landing so far.
+        telemetry: What the autopilot last said, None before it said anything.
+        telemetry_age_s: Since it was received, by a steady clock.
+        map_age_s: Since the newest heatmap in the map was taken; infinite without one.
+        parameters: Their limits of age and altitude hold here too.
+    """
+    if state not in _MAY_BEGIN:
+        return f'a landing is under way already: {state.value}'
+    return bad_vehicle(telemetry, telemetry_age_s, parameters) or bad_map(map_age_s, '', parameters)
