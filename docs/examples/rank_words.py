@@ -1,14 +1,14 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Rank the words of the vocabularies against one image; without an argument, a drawn meadow."""
+"""Rank the words of the vocabularies against one image; without an argument, a drawn town."""
 
 import sys
 
 import cv2
 
 from peace_ros.core.domain import Frame
-from peace_ros.core.inference import Bundle, ClipEncoder
-from peace_ros.core.prompting import PromptGenerator, PromptingParameters, load_vocabularies
+from peace_ros.core.pipeline import create_generator
+from peace_ros.core.prompting import PromptingParameters
 from peace_ros.simulation.world import draw_world
 
 if len(sys.argv) > 1:
@@ -16,8 +16,7 @@ if len(sys.argv) > 1:
 else:
     image_rgb = draw_world(seed=1, size_m=100.0, gsd_m=0.2).image_rgb
 
-encoder = ClipEncoder(Bundle.load('clip-small'))
-generator = PromptGenerator(encoder, load_vocabularies('vocabularies.yaml'), PromptingParameters())
+generator = create_generator(PromptingParameters(template='PEACE'))
 prompt = generator.generate(Frame(image_rgb, stamp_ns=0))
 for category, words in prompt.ranking.items():
     best = ', '.join(f'{ranked.word} {ranked.score:.3f}' for ranked in words[:4])
