@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import atan2, cos, hypot, sin
 from typing import Any, Protocol
@@ -304,7 +305,12 @@ class Px4:
         return _landing_target(mavlink.MAV_FRAME_LOCAL_NED, site_ned_m, body_m, stamp_us)
 
 
-DIALECTS = ('auto', 'ardupilot', 'px4')
+AUTO = 'auto'
+_DIALECTS: dict[str, Callable[[str], Dialect]] = {
+    'ardupilot': ArduPilot,
+    'px4': lambda _hold_mode: Px4(),
+}
+"""Name -> dialect, given ArduPilot's mode for holding position; the first that fits is taken."""
 NO_MULTICOPTERS = {
     mavlink.MAV_TYPE_FIXED_WING: 'a fixed-wing aircraft',
     mavlink.MAV_TYPE_ANTENNA_TRACKER: 'an antenna tracker',
@@ -318,6 +324,32 @@ VTOL_TYPES = range(19, 26)
 """MAV_TYPE_VTOL_...; their names differ between versions of pymavlink."""
 
 
+def register_dialect(name: str, make: Callable[[str], Dialect]) -> None:
+    """Make another dialect known by a name, before the vehicle is opened.
+
+    Args:
+        name: What parameter ``dialect`` takes.
+        make: Returns the dialect, given parameter ``vehicle.hold_mode``.
+
+    Raises:
+        VehicleError: The name is taken.
+    """
+    if name in dialect_names():
+        raise VehicleError(f'dialect {name!r} exists already: choose another name')
+    _DIALECTS[name] = make
+
+
+def dialect_names() -> tuple[str, ...]:
+    """Return what may be asked for: ``auto`` and the registered names."""
+    return (AUTO, *_DIALECTS)
+
+
+def check_dialect(wanted: str) -> None:
+    """Raise VehicleError for a name that is not known."""
+    if wanted not in dialect_names():
+        raise VehicleError(f'dialect {wanted!r}: choose one of {", ".join(dialect_names())}')
+
+
 def choose_dialect(
     wanted: str,
     autopilot: int,
@@ -327,7 +359,7 @@ def choose_dialect(
     """Return the dialect of the autopilot that was heard.
 
     Args:
-        wanted: ``auto``, ``ardupilot`` or ``px4``.
+        wanted: One of :func:`dialect_names`.
         autopilot: MAV_AUTOPILOT of its HEARTBEAT.
         hold_mode: ArduPilot's mode for holding position.
         vehicle_type: MAV_TYPE of its HEARTBEAT.
@@ -336,8 +368,7 @@ def choose_dialect(
         VehicleError: Unknown name, the autopilot heard is another one than was asked for, or its
             vehicle is no multicopter.
     """
-    if wanted not in DIALECTS:
-        raise VehicleError(f'dialect {wanted!r}: choose one of {", ".join(DIALECTS)}')
+    check_dialect(wanted)
     kind = NO_MULTICOPTERS.get(vehicle_type, '')
     if autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA and vehicle_type in VTOL_TYPES:
         kind = 'a VTOL, which ArduPlane flies'
@@ -346,11 +377,9 @@ def choose_dialect(
             f'the vehicle heard is {kind} (MAV_TYPE {vehicle_type}): connect to a multicopter or '
             'a helicopter'
         )
-    known: tuple[Dialect, ...] = (ArduPilot(hold_mode=hold_mode), Px4())
-    for dialect in known:
+    makers = list(_DIALECTS.values()) if wanted == AUTO else [_DIALECTS[wanted]]
+    for dialect in (make(hold_mode) for make in makers):
         if dialect.autopilot == autopilot:
-            if wanted not in {'auto', dialect.name}:
-                break
             return dialect
     raise VehicleError(
         f'the autopilot heard is of type {autopilot} (MAV_AUTOPILOT) and does not speak '

@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import select
 import socket
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from peace_ros.core.domain.errors import VehicleError
@@ -129,12 +131,7 @@ class _Serial:
     datagrams = False
 
     def __init__(self, device: str, baud: int) -> None:
-        try:
-            serial: Any = importlib.import_module('serial')
-        except ImportError as error:
-            raise VehicleError(
-                f'{device}: serial lines need pyserial; install python3-serial (apt) or pyserial'
-            ) from error
+        serial: Any = importlib.import_module('serial')
         try:
             self._line: Any = serial.Serial(device, baud, timeout=0, write_timeout=WRITE_S)
         except (OSError, ValueError) as error:
@@ -162,6 +159,44 @@ class _Serial:
         self._line.close()
 
 
+@dataclass(frozen=True)
+class LineAddress:
+    """What a URL names."""
+
+    scheme: str
+    """``udpin``, ``udpout``, ``tcp`` or ``serial``."""
+    host: str
+    """Of a serial line the device."""
+    port: int
+    """Of a serial line its speed in baud."""
+
+
+def parse_url(url: str) -> LineAddress:
+    """Read a URL; nothing is opened.
+
+    Args:
+        url: See ``URL_HELP``.
+
+    Raises:
+        VehicleError: It is not understood, or needs a package that is not installed.
+    """
+    scheme, _, rest = url.partition(':')
+    if url.startswith('/dev/') or scheme == 'serial':
+        device, _, baud = (url if url.startswith('/dev/') else rest).partition(':')
+        if not device.startswith('/') or not (baud == '' or baud.isdecimal()):
+            raise VehicleError(f'connection {url!r} is not understood: {URL_HELP}')
+        if importlib.util.find_spec('serial') is None:
+            raise VehicleError(
+                f'{device}: serial lines need pyserial; install python3-serial (apt) or pyserial'
+            )
+        return LineAddress('serial', device, int(baud) if baud else DEFAULT_BAUD)
+    host, _, port_text = rest.rpartition(':')
+    port = int(port_text) if port_text.isdecimal() else -1
+    if scheme not in {'udpin', 'udpout', 'tcp'} or not host or not 0 <= port <= 65535:
+        raise VehicleError(f'connection {url!r} is not understood: {URL_HELP}')
+    return LineAddress(scheme, host, port)
+
+
 def open_transport(url: str, connect_s: float | None = None) -> Transport:
     """Open the line that a URL names.
 
@@ -172,16 +207,9 @@ def open_transport(url: str, connect_s: float | None = None) -> Transport:
     Raises:
         VehicleError: The URL is not understood, the port is taken, the device is missing.
     """
-    scheme, _, rest = url.partition(':')
-    if url.startswith('/dev/') or scheme == 'serial':
-        device, _, baud = (url if url.startswith('/dev/') else rest).partition(':')
-        if not device.startswith('/') or not (baud == '' or baud.isdigit()):
-            raise VehicleError(f'connection {url!r} is not understood: {URL_HELP}')
-        return _Serial(device, int(baud) if baud else DEFAULT_BAUD)
-    host, _, port_text = rest.rpartition(':')
-    port = int(port_text) if port_text.isdecimal() else -1
-    if scheme not in {'udpin', 'udpout', 'tcp'} or not host or not 0 <= port <= 65535:
-        raise VehicleError(f'connection {url!r} is not understood: {URL_HELP}')
-    if scheme == 'tcp':
-        return _Tcp(host, port, CONNECT_S if connect_s is None else connect_s)
-    return _Udp(host, port, listen=scheme == 'udpin')
+    at = parse_url(url)
+    if at.scheme == 'serial':
+        return _Serial(at.host, at.port)
+    if at.scheme == 'tcp':
+        return _Tcp(at.host, at.port, CONNECT_S if connect_s is None else connect_s)
+    return _Udp(at.host, at.port, listen=at.scheme == 'udpin')
