@@ -4,21 +4,24 @@
 
 from __future__ import annotations
 
-import threading
+from collections.abc import Callable
 from math import isfinite
 from typing import Protocol, cast
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from peace_ros.core.domain import Telemetry, VehicleError
 from peace_ros.core.landing import LandingParameters, State
+from peace_ros.core.threads import GuardedThread
 from peace_ros.core.vehicle import VehicleLink
 
 SILENT_STATES = frozenset({State.IDLE, State.ABORTED})
 """States in which nothing is submitted to the vehicle."""
 
+_JOIN_S = 2.0
 _MAY_BEGIN = frozenset({State.IDLE, State.HOLD, State.HANDOVER, State.ABORTED})
 
 
@@ -40,18 +43,22 @@ class Engageable(Protocol):
     def end_landing(self) -> bool:
         """End the landing; return whether one was flown."""
 
+    def fail(self, error: BaseException) -> None:
+        """Take what ended a thread."""
+
 
 class EngagementServices:
     """``~/engage`` and ``~/disengage``, and engaging once by itself where that is asked for.
 
-    Asking for control may take seconds, in which steps and heatmaps must go on: the services have
-    a callback group of their own.
+    Asking for control may take seconds, in which steps and heatmaps must go on: it has a thread of
+    its own, and the services have a callback group in which one waits for the other.
     """
 
     def __init__(self, node: Engageable, *, auto: bool) -> None:
         self._node = node
         self._auto_due = auto
         self._ros = cast('Node', node)
+        self._thread: GuardedThread | None = None
         beside = MutuallyExclusiveCallbackGroup()
         for name, callback in (('engage', self._on_engage), ('disengage', self._on_disengage)):
             self._ros.create_service(Trigger, f'~/{name}', callback, callback_group=beside)
@@ -60,17 +67,30 @@ class EngagementServices:
         """Engage beside the caller, once, when it was asked for and nothing speaks against it."""
         if self._auto_due and not self._node.reason_against():
             self._auto_due = False
-            threading.Thread(target=self._auto_engage, name='auto_engage', daemon=True).start()
+            self._start(lambda: self._engage(by_person=False))
 
-    def _auto_engage(self) -> None:
-        self._engage(by_person=False)
+    def close(self) -> None:
+        """Wait until nobody engages any more; the link must have been closed before."""
+        if self._thread is not None:
+            self._thread.join(timeout=_JOIN_S)
 
-    def _on_engage(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        problem = self._engage(by_person=True)
-        instead = self._node.hold_level() if problem else ''
-        problem = f'{problem}; {instead}' if instead else problem
+    def _start(self, work: Callable[[], object]) -> None:
+        self._thread = GuardedThread(work, 'engage', self._node.fail)
+        self._thread.start()
+
+    async def _on_engage(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        answer = Future()
+        self._start(lambda: answer.set_result(self._engage_for_person()))
+        problem: str = await answer
         response.success, response.message = not problem, problem or 'engaged'
         return response
+
+    def _engage_for_person(self) -> str:
+        problem = self._engage(by_person=True)
+        instead = self._node.hold_level() if problem else ''
+        return f'{problem}; {instead}' if instead else problem
 
     def _engage(self, *, by_person: bool) -> str:
         """Ask for control once; return what speaks against the landing, empty when it began."""

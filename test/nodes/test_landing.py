@@ -77,13 +77,6 @@ def test_a_silent_port_is_a_hold_with_a_reason_and_nothing_engages(bench, values
     assert 'HEARTBEAT' in answer.message
 
 
-def test_a_wrong_url_is_a_hold_with_a_reason(bench, values_of):
-    statuses = listen(bench)
-    bench.run(LandingNode, mavlink='nonsense')
-    bench.until(lambda: bool(statuses) and "'nonsense'" in statuses[-1].status[0].message)
-    assert state_of(statuses, values_of) == 'HOLD'
-
-
 def test_refuses_to_engage_without_telemetry_and_without_heatmaps(bench):
     node = bench.run(LandingNode, interface='twist')
     assert 'no telemetry' in call(bench, 'engage').message

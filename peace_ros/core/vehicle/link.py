@@ -78,10 +78,11 @@ class VehicleLink(Protocol):
         """Ask to be held level without any position; only for a person who asks."""
         ...
 
-    def stop_at_once(self) -> None:
+    def stop_at_once(self) -> bool:
         """Send zero velocity and ask for the autopilot's own hold mode, without any waiting.
 
-        It works when other threads of the link are dead; VehicleError when the line broke.
+        It works when other threads of the link are dead. Return whether the vehicle still obeyed
+        us, and it is worth repeating; VehicleError when the line broke.
         """
         ...
 

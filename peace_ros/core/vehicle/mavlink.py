@@ -241,26 +241,29 @@ class MavlinkLink:
         """Ask for the autopilot's own hold mode; blocks at most ``request_limit_s`` and a bit."""
         return self.set_mode(self.dialect.hold_mode)
 
-    def stop_at_once(self) -> None:
+    def stop_at_once(self) -> bool:
         """Send zero velocity and ask once for the autopilot's own hold mode; awaits no answer.
 
         For a process that has to end: it needs no other thread of this link and not their lock.
-        Nothing is sent to a vehicle that obeys somebody else, or holds by itself already.
+
+        Returns:
+            False when the vehicle obeys somebody else, or holds by itself: nothing was sent.
 
         Raises:
             VehicleError: The line broke.
         """
         heard, dialect = self._assembler, self._dialect
         if heard is None or dialect is None or self.taken_over:
-            return
+            return False
         if heard.mode != dialect.control_mode:
-            return
+            return False
         limit_ns = int(self._parameters.request_limit_s * 1e9)
         self._control.leave_to(dialect.hold_mode, time.monotonic_ns() + limit_ns)
         self._send_setpoint(Setpoint(stamp_ns=0))
         mode = (*dialect.mode_command(dialect.hold_mode), 0.0, 0.0, 0.0, 0.0)
         command = mavlink.MAV_CMD_DO_SET_MODE
         self._send(mavlink.MAVLink_command_long_message(*self._peer.target, command, 0, *mode))
+        return True
 
     def request_land(self) -> RequestResult:
         """Ask for the autopilot's own landing, only while it obeys us."""

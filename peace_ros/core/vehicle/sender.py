@@ -30,6 +30,8 @@ JOIN_S = 2.0
 STUCK_PERIODS = 6
 """A thread that has not begun a tick for so many periods is stuck or dead."""
 
+STUCK_TURNS = 3
+
 
 class SenderState(Enum):
     """What the sender does."""
@@ -105,6 +107,7 @@ class SetpointSender:
         self._last_gap_s = self._max_gap_s = 0.0
         self._thread: GuardedThread | None = None
         self._ticked_ns = 0
+        self._stuck_turns = 0
 
     def start(self) -> None:
         """Begin the thread; VehicleError after :meth:`stop`, which is final."""
@@ -122,6 +125,18 @@ class SetpointSender:
             return False
         limit_ns = STUCK_PERIODS * self._period_s * 1e9
         return not self._thread.is_alive() or self._steady_ns() - self._ticked_ns > limit_ns
+
+    def watch(self) -> None:
+        """Find out whether the thread runs; to be called at a steady rate of about 10 Hz.
+
+        It counts turns, not time: in a process that was stopped as a whole nobody missed any.
+
+        Raises:
+            RuntimeError: It was found stuck ``STUCK_TURNS`` times in a row.
+        """
+        self._stuck_turns = self._stuck_turns + 1 if self.is_stuck else 0
+        if self._stuck_turns >= STUCK_TURNS:
+            raise RuntimeError(SenderState.STUCK.value)
 
     def submit(self, setpoint: Setpoint) -> None:
         """Replace the set-point that is being sent; one that stops the vehicle leaves at once.

@@ -45,12 +45,13 @@ def read_key(key_file: str) -> bytes:
     Raises:
         ConfigurationError: The file cannot be read or is empty.
     """
-    path = Path(key_file).expanduser()
     try:
+        path = Path(key_file).expanduser()
         content = path.read_bytes()
-    except OSError as error:
+    except (OSError, RuntimeError, ValueError) as error:  # also a user or a name that cannot be
+        reason = error.strerror if isinstance(error, OSError) else error
         raise ConfigurationError(
-            f'signing_key_file {path}: {error.strerror}; give 32 bytes or a passphrase'
+            f'signing_key_file {key_file}: {reason}; give 32 bytes or a passphrase'
         ) from error
     if len(content) == KEY_BYTES:
         return content

@@ -28,7 +28,7 @@ class StallableLandingNode(LandingNode):
 
 def main() -> int:
     """Run the node until SIGINT or SIGTERM."""
-    return run(StallableLandingNode, threads=2)
+    return run(StallableLandingNode)
 
 
 if __name__ == '__main__':
