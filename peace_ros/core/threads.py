@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import sys
 import threading
+import traceback
 from collections.abc import Callable
 
 OnDefect = Callable[[BaseException], None]
@@ -42,10 +43,7 @@ class GuardedThread(threading.Thread):
 
 
 def print_defect(error: BaseException) -> None:
-    """Print a traceback with the name of the thread, as Python does for its own threads."""
-    threading.excepthook(
-        threading.ExceptHookArgs(
-            (type(error), error, error.__traceback__, threading.current_thread())
-        )
-    )
+    """Print the name of the thread that calls this, and the traceback, to standard error."""
+    print(f'a defect ended thread {threading.current_thread().name}:', file=sys.stderr)
+    traceback.print_exception(error)
     sys.stderr.flush()

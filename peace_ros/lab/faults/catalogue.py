@@ -7,7 +7,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from peace_ros.core.domain import ConfigurationError
-from peace_ros.lab.faults import link_faults, perception_faults, vehicle_faults, world_faults
+from peace_ros.lab.faults import (
+    link_faults,
+    perception_faults,
+    thread_faults,
+    vehicle_faults,
+    world_faults,
+)
 from peace_ros.lab.faults.fault import Fault
 
 FAULTS: tuple[Fault, ...] = (
@@ -15,6 +21,7 @@ FAULTS: tuple[Fault, ...] = (
     *world_faults.FAULTS,
     *link_faults.FAULTS,
     *vehicle_faults.FAULTS,
+    *thread_faults.FAULTS,
 )
 """The matrix, in the order of the documentation."""
 REPRESENTATIVE = (
@@ -22,6 +29,7 @@ REPRESENTATIVE = (
     'pilot_takes_over_landing',
     'altitude_nan',
     'executor_stalls',
+    'thread_setpoint_sender',
 )
 """What continuous integration runs: one of each kind."""
 

@@ -81,6 +81,7 @@ class BenchNode:
         )
         self._node.create_subscription(PoseStamped, 'ground_truth/pose', self._on_pose, qos.POSE)
         self._stall = self._node.create_publisher(Float64, 'fault/stall', qos.RESULT)
+        self._defect = self._node.create_publisher(String, 'fault/defect', qos.RESULT)
         self._model = self._node.create_publisher(String, 'fault/model', qos.RESULT)
         self._engage = self._node.create_client(Trigger, 'landing/engage')
         self._node.create_timer(_RELEASE_S, self._release)
@@ -155,6 +156,14 @@ class BenchNode:
     def stall_landing(self, seconds: float) -> None:
         """Let a callback of the landing node take so long."""
         self._stall.publish(Float64(data=seconds))
+
+    def break_landing(self, thread: str) -> None:
+        """Let a thread of the landing node raise an exception."""
+        self._defect.publish(String(data=thread))
+
+    def ask_to_engage(self) -> None:
+        """Call the landing node's service; nobody waits for the answer."""
+        self._engage.call_async(Trigger.Request())
 
     def fail_model(self, fault: str) -> None:
         """Tell the segmentation node what its model shall do; empty: work."""

@@ -145,6 +145,6 @@ class Record:
 
 STILL = frozenset(
     state.value for state in (State.IDLE, State.WAITING, State.HANDOVER, State.HOLD, State.ABORTED)
-)
+) | {'FAILED'}
 """States in which the set-point has to be zero, written down here a second time on purpose: the
 judge does not ask the accused."""
