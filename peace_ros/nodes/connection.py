@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reaches the vehicle in the background: a silent port is waited for, and said to be silent."""
+"""Opens the link to the vehicle in the background; while nothing is heard, it says so."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _Link = TypeVar('_Link', bound=Closable)
 
 
 class Connection(Generic[_Link]):
-    """Opens a link in a thread and goes on trying until it is there."""
+    """Opens a link in a thread, and tries again until it is open."""
 
     def __init__(
         self, open_link: Callable[[], _Link], say: Callable[[str], None], on_defect: OnDefect

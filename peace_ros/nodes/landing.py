@@ -156,7 +156,7 @@ class LandingNode(PeaceNode):
         return was_flying
 
     def close(self) -> None:
-        """Leave the vehicle standing: zero velocity, then silence."""
+        """Stop the vehicle: zero velocity, then no further set-point."""
         with self._lock:
             self._closed = True
             if self._sender is not None:
@@ -166,12 +166,12 @@ class LandingNode(PeaceNode):
         self._engagement.close()
 
     def watch(self) -> None:
-        """Take a sender whose thread stands still for a failure."""
+        """Raise when the thread of the sender does not run."""
         if self._sender is not None:
             self._sender.watch()
 
     def last_steps(self, sentence: str) -> tuple[Callable[[], None], ...]:
-        """Leave the vehicle standing, and say why."""
+        """Stop the vehicle, and publish why."""
         return self._stop_at_once, lambda: self._publisher.publish_failure(
             sentence, self.clock_ns()
         )

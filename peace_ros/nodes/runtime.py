@@ -34,7 +34,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class PeaceNode(Node):  # type: ignore[misc]
-    """A node whose parameters are dataclasses and which knows when to repeat itself."""
+    """A node with dataclasses as parameters, which limits how often it repeats a warning."""
 
     def __init__(self, name: str, *groups: Group, **options: Any) -> None:
         """Create the node; refuse parameters that none of the dataclasses declares.
@@ -153,8 +153,8 @@ def run(create: Callable[[], PeaceNode], args: Sequence[str] | None = None) -> i
         _end_on_signals(node)
         spin_until_ended(node)
     except _Interrupted:
-        # Half a node can be neither used nor destroyed, and the threads of its middleware would
-        # abort an ordinary exit.
+        # A node that is not complete can be neither used nor destroyed, and the threads of its
+        # middleware would abort an ordinary exit.
         os._exit(EXIT_OK)
     except PeaceError as error:
         return _refused(error)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, Twist
@@ -65,16 +66,10 @@ class VehicleAccess:
         check_access(options.mavlink, options.dialect, parameters.signing_key_file)
         timeout_s = min(_TRY_S, parameters.connect_timeout_s)
 
-        def open_link() -> VehicleLink:
-            return open_vehicle(
-                options.mavlink,
-                options.dialect,
-                node.clock_ns,
-                parameters,
-                timeout_s,
-                on_defect=node.fail,
-            )
-
+        open_link = partial(
+            open_vehicle,
+            *(options.mavlink, options.dialect, node.clock_ns, parameters, timeout_s, node.fail),
+        )
         self._connection = Connection(
             open_link, lambda sentence: node.say('vehicle', sentence), node.fail
         )
@@ -100,7 +95,7 @@ class VehicleAccess:
         return link.problem or link.position_problem
 
     def follow(self, decision: Decision) -> None:
-        """Tell the vehicle how we are, and do what follows a hand-over; once per step."""
+        """Report our health to the vehicle, and do what follows a hand-over; once per step."""
         link = self.link
         if link is None:
             return

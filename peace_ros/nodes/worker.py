@@ -18,7 +18,7 @@ _JOIN_S = 2.0
 class NewestWorker(Generic[_Item]):
     """A thread that works on the newest item; what comes while it works replaces what waits.
 
-    So a slow model loses frames and never gathers latency. A PeaceError of the work is handed
+    So a slow model drops frames and never accumulates latency. A PeaceError of the work is handed
     to ``complain`` and the thread goes on; any other exception is a defect: it ends the process
     through ``fail``, because a node that silently stopped would be worse.
     """

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import atan2, cos, hypot, sin
 from typing import Any, Protocol
 
@@ -28,7 +28,7 @@ ModeCommand = Vector
 
 
 class Dialect(Protocol):
-    """One autopilot's way of speaking."""
+    """The modes and messages of one kind of autopilot."""
 
     @property
     def name(self) -> str:
@@ -179,33 +179,11 @@ def _unknown_mode(mode: str, known: list[str]) -> VehicleError:
 
 
 ARDUCOPTER_MODES: dict[str, int] = {
-    'STABILIZE': 0,
-    'ACRO': 1,
-    'ALT_HOLD': 2,
-    'AUTO': 3,
-    'GUIDED': 4,
-    'LOITER': 5,
-    'RTL': 6,
-    'CIRCLE': 7,
-    'LAND': 9,
-    'DRIFT': 11,
-    'SPORT': 13,
-    'FLIP': 14,
-    'AUTOTUNE': 15,
-    'POSHOLD': 16,
-    'BRAKE': 17,
-    'THROW': 18,
-    'AVOID_ADSB': 19,
-    'GUIDED_NOGPS': 20,
-    'SMART_RTL': 21,
-    'FLOWHOLD': 22,
-    'FOLLOW': 23,
-    'ZIGZAG': 24,
-    'SYSTEMID': 25,
-    'AUTOROTATE': 26,
-    'AUTO_RTL': 27,
-    'TURTLE': 28,
+    entry.name.removeprefix('COPTER_MODE_'): number
+    for number, entry in mavlink.enums['COPTER_MODE'].items()
+    if number != mavlink.COPTER_MODE_ENUM_END
 }
+_ARDUCOPTER_NAMES = {number: name for name, number in ARDUCOPTER_MODES.items()}
 
 
 @dataclass(frozen=True)
@@ -223,13 +201,10 @@ class ArduPilot:
     height_message: int = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
     home_is_local: bool = False
     heartbeat_rate_hz: float = 0.0
-    _names: dict[int, str] = field(
-        default_factory=lambda: {number: name for name, number in ARDUCOPTER_MODES.items()}
-    )
 
     def mode_name(self, custom_mode: int) -> str:
         """Return e.g. GUIDED; MODE 99 for one that is not known."""
-        return self._names.get(custom_mode, f'MODE {custom_mode}')
+        return _ARDUCOPTER_NAMES.get(custom_mode, f'MODE {custom_mode}')
 
     def mode_command(self, mode: str) -> ModeCommand:
         """Return (flags, mode number, 0)."""
@@ -262,6 +237,7 @@ PX4_MODES: dict[str, tuple[int, int]] = {
     'STABILIZED': (7, 0),
 }
 """Main and sub mode: bits 16 to 23 and 24 to 31 of custom_mode (PX4 px4_custom_mode.h)."""
+_PX4_NAMES = {numbers: name for name, numbers in PX4_MODES.items()}
 
 
 @dataclass(frozen=True)
@@ -279,14 +255,11 @@ class Px4:
     height_message: int = mavlink.MAVLINK_MSG_ID_ALTITUDE
     home_is_local: bool = True
     heartbeat_rate_hz: float = 5.0
-    _names: dict[tuple[int, int], str] = field(
-        default_factory=lambda: {numbers: name for name, numbers in PX4_MODES.items()}
-    )
 
     def mode_name(self, custom_mode: int) -> str:
         """Return e.g. OFFBOARD; MODE 4.9 for one that is not known."""
         main, sub = (custom_mode >> 16) & 0xFF, (custom_mode >> 24) & 0xFF
-        return self._names.get((main, sub), f'MODE {main}.{sub}')
+        return _PX4_NAMES.get((main, sub), f'MODE {main}.{sub}')
 
     def mode_command(self, mode: str) -> ModeCommand:
         """Return (flags, main mode, sub mode)."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The link: one thread reads and keeps house, requests wait for their answer with a limit."""
+"""The link: one thread reads and sends what is periodic; requests wait for an answer, limited."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ THRUST_AS_THRUST = 8
 
 
 class MavlinkLink:
-    """Talks to one autopilot, and believes no other.
+    """Talks to one autopilot, and ignores all others.
 
     Args:
         transport: An open line; the link closes it.
@@ -119,7 +119,8 @@ class MavlinkLink:
             age_s = self._heard().heartbeat_age_s(time.monotonic_ns())
         if age_s <= limit_s:
             return ''
-        return f'no HEARTBEAT of the autopilot for {age_s:.0f} s, limit {limit_s} s: is it there?'
+        age = f'{age_s:.0f} s, limit {limit_s} s'
+        return f'no HEARTBEAT of the autopilot for {age}: check its power and the line'
 
     @property
     def position_problem(self) -> str:
@@ -130,7 +131,7 @@ class MavlinkLink:
 
     @property
     def ignored(self) -> int:
-        """Messages of others than the believed autopilot."""
+        """Messages of other systems than the chosen autopilot."""
         return self._peer.ignored
 
     @property
@@ -140,19 +141,19 @@ class MavlinkLink:
 
     @property
     def rejected(self) -> int:
-        """Messages of the autopilot that were not believed: numbers that are none."""
+        """Messages of the autopilot that were rejected: values that are not numbers."""
         with self._changed:
             return self._heard().rejected
 
     @property
     def late(self) -> int:
-        """Messages that came twice or out of order, and were dropped."""
+        """Messages that were received twice or out of order, and dropped."""
         with self._changed:
             return self._heard().late
 
     @property
     def clock(self) -> TimeMap:
-        """The autopilot's clock in terms of ours, for looking at."""
+        """The map from the autopilot's clock to ours, for inspection."""
         return self._clock
 
     @property
@@ -190,7 +191,7 @@ class MavlinkLink:
             return [text for _, text in self._heard().texts.entries]
 
     def report_health(self, mav_state: int) -> None:
-        """Say MAV_STATE in our HEARTBEAT from now on; a change is told at once."""
+        """Report MAV_STATE in our HEARTBEAT from now on; a change is sent at once."""
         self._house.set_health(mav_state)
 
     def send_velocity(self, setpoint: Setpoint) -> None:
@@ -340,12 +341,7 @@ class MavlinkLink:
         limit_s = self._parameters.connect_timeout_s
         with self._changed:
             self._changed.wait_for(
-                lambda: (
-                    self._assembler is not None
-                    or self._error is not None
-                    or self._thread.defect is not None
-                ),
-                limit_s,
+                lambda: self._assembler or self._error or self._thread.defect, limit_s
             )
             if self._assembler is not None:
                 return
@@ -373,7 +369,7 @@ class MavlinkLink:
             try:
                 self._keep_house(time.monotonic_ns())
             except VehicleError:
-                continue  # the transport knows, says why, and opens the line again
+                continue  # the transport reports the reason, and opens the line again
 
     def _on_defect(self, error: BaseException) -> None:
         self._report(error)
@@ -422,7 +418,7 @@ class MavlinkLink:
             self._changed.notify_all()
 
     def _meet(self, message: Any, source: Source, now_ns: int) -> bool:
-        """Choose the autopilot at its first HEARTBEAT; tell whether this was it."""
+        """Choose the autopilot at its first HEARTBEAT; return whether it was chosen."""
         if not self._peer.is_candidate(message, source, now_ns):
             return False
         try:

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The timed sender with the dead-man: no set-point outlives its age.
+"""The timed sender with the dead-man: no set-point is sent after its age limit.
 
 Fresh set-point -> it is sent; the first that stops the vehicle at once, the others in turn.
 Before it is ``limit_s`` old -> zero velocity. Older than ``limit_s`` plus ``handover_s`` -> the
@@ -55,10 +55,9 @@ class SenderStatistics:
     zeros: int = 0
     """Zero set-points of the dead-man."""
     withheld: int = 0
-    """Ticks at which the autopilot was not ours to command."""
+    """Ticks at which somebody else controlled the autopilot."""
     errors: int = 0
     last_error: str = ''
-    last_gap_s: float = 0.0
     max_gap_s: float = 0.0
     """Longest time between two set-points in a row of sending."""
 
@@ -104,7 +103,7 @@ class SetpointSender:
         self._sent = self._zeros = self._withheld = self._errors = 0
         self._last_error = ''
         self._last_sent_ns: int | None = None
-        self._last_gap_s = self._max_gap_s = 0.0
+        self._max_gap_s = 0.0
         self._thread: GuardedThread | None = None
         self._ticked_ns = 0
         self._stuck_turns = 0
@@ -148,7 +147,7 @@ class SetpointSender:
         if not all(isfinite(each) for each in v):
             raise VehicleError(f'velocity set-point {v} m/s: all components must be finite')
         with self._lock:
-            # Whoever kills this process a moment later must not leave the vehicle sinking.
+            # If this process is killed a moment later, the vehicle must not go on sinking.
             stops = setpoint.is_zero and self._newest is not None and not self._newest.is_zero
             self._newest, self._submitted_ns = setpoint, self._steady_ns()
         if stops:
@@ -175,22 +174,19 @@ class SetpointSender:
         self._stop.set()
         self._wake.set()
 
-    abort = stop
-
     def statistics(self) -> SenderStatistics:
         """Return a snapshot."""
         stopped = SenderState.STOPPED if self._stop.is_set() else None
         stuck = SenderState.STUCK if self.is_stuck else None
         with self._lock:
             return SenderStatistics(
-                stopped or stuck or self._state,
-                self._sent,
-                self._zeros,
-                self._withheld,
-                self._errors,
-                self._last_error,
-                self._last_gap_s,
-                self._max_gap_s,
+                state=stopped or stuck or self._state,
+                sent=self._sent,
+                zeros=self._zeros,
+                withheld=self._withheld,
+                errors=self._errors,
+                last_error=self._last_error,
+                max_gap_s=self._max_gap_s,
             )
 
     def tick(self) -> None:
@@ -240,8 +236,7 @@ class SetpointSender:
         now_ns = self._steady_ns()
         with self._lock:
             if self._last_sent_ns is not None:
-                self._last_gap_s = (now_ns - self._last_sent_ns) / 1e9
-                self._max_gap_s = max(self._max_gap_s, self._last_gap_s)
+                self._max_gap_s = max(self._max_gap_s, (now_ns - self._last_sent_ns) / 1e9)
             self._last_sent_ns = now_ns
             if state is SenderState.SENDING:
                 self._sent += 1

@@ -8,7 +8,6 @@ import importlib
 import importlib.util
 import select
 import socket
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 from peace_ros.core.domain.errors import VehicleError
@@ -159,23 +158,8 @@ class _Serial:
         self._line.close()
 
 
-@dataclass(frozen=True)
-class LineAddress:
-    """What a URL names."""
-
-    scheme: str
-    """``udpin``, ``udpout``, ``tcp`` or ``serial``."""
-    host: str
-    """Of a serial line the device."""
-    port: int
-    """Of a serial line its speed in baud."""
-
-
-def parse_url(url: str) -> LineAddress:
-    """Read a URL; nothing is opened.
-
-    Args:
-        url: See ``URL_HELP``.
+def parse_url(url: str) -> tuple[str, str, int]:
+    """Return scheme, host and port of a URL (see ``URL_HELP``), of a serial line device and baud.
 
     Raises:
         VehicleError: It is not understood, or needs a package that is not installed.
@@ -189,12 +173,12 @@ def parse_url(url: str) -> LineAddress:
             raise VehicleError(
                 f'{device}: serial lines need pyserial; install python3-serial (apt) or pyserial'
             )
-        return LineAddress('serial', device, int(baud) if baud else DEFAULT_BAUD)
+        return 'serial', device, int(baud) if baud else DEFAULT_BAUD
     host, _, port_text = rest.rpartition(':')
     port = int(port_text) if port_text.isdecimal() else -1
     if scheme not in {'udpin', 'udpout', 'tcp'} or not host or not 0 <= port <= 65535:
         raise VehicleError(f'connection {url!r} is not understood: {URL_HELP}')
-    return LineAddress(scheme, host, port)
+    return scheme, host, port
 
 
 def open_transport(url: str, connect_s: float | None = None) -> Transport:
@@ -207,9 +191,9 @@ def open_transport(url: str, connect_s: float | None = None) -> Transport:
     Raises:
         VehicleError: The URL is not understood, the port is taken, the device is missing.
     """
-    at = parse_url(url)
-    if at.scheme == 'serial':
-        return _Serial(at.host, at.port)
-    if at.scheme == 'tcp':
-        return _Tcp(at.host, at.port, CONNECT_S if connect_s is None else connect_s)
-    return _Udp(at.host, at.port, listen=at.scheme == 'udpin')
+    scheme, host, port = parse_url(url)
+    if scheme == 'serial':
+        return _Serial(host, port)
+    if scheme == 'tcp':
+        return _Tcp(host, port, CONNECT_S if connect_s is None else connect_s)
+    return _Udp(host, port, listen=scheme == 'udpin')

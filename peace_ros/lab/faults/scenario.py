@@ -116,6 +116,7 @@ class Scenario:
             self.bench.look()
             if self.fault.until_reached and self._has_reached(self.fault.expected.reaches, 0.0):
                 time.sleep(_AFTER_S)
+                self.bench.look()
                 return
             time.sleep(_LOOK_S)
 
