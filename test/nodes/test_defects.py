@@ -14,10 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import Image
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from peace_ros.core.domain import Prompt, Setpoint, Telemetry
 from peace_ros.core.vehicle import SetpointSender, open_vehicle
+from peace_ros.nodes import qos
 from peace_ros.nodes.connection import Connection
 from peace_ros.nodes.engagement import EngagementServices
 from peace_ros.nodes.failure import Failure
@@ -240,10 +244,6 @@ def test_a_defect_in_a_thread_reaches_its_owner(name, bench, picture):
 
 def feed(bench: Any, picture: Callable[[int], Any]) -> None:
     """Let the bench publish what workers work on."""
-    from diagnostic_msgs.msg import DiagnosticArray
-    from sensor_msgs.msg import Image
-
-    from peace_ros.nodes import qos
 
     def publish(topic: str) -> None:
         if topic in {'prompt', 'both'}:
@@ -319,3 +319,28 @@ def test_a_defect_in_a_callback_ends_the_process_within_a_second(way):
     assert 'ZeroDivisionError: by nothing' in output
     assert 'last step' in output
     assert 'Traceback' in log
+
+
+def test_a_landing_node_that_still_waits_for_its_vehicle_fails_as_well(bench, values_of):
+    statuses = bench.heard(DiagnosticArray, 'landing/status', qos.RESULT)
+    node = subprocess.Popen(
+        [
+            *(sys.executable, '-m', 'peace_ros.lab.faults.landing', '--ros-args'),
+            *('-p', 'mavlink:=udpin:127.0.0.1:0'),
+        ],
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        defects = bench.offer(String, 'fault/defect', qos.RESULT)
+        bench.until(lambda: bool(statuses))
+        defects.publish(String(data='connection'))
+        _, log = node.communicate(timeout=20)
+    finally:
+        node.kill()
+    assert node.returncode == 1, log
+    assert 'InjectedDefectError' in log
+    bench.until(lambda: values_of(statuses[-1])['state'] == 'FAILED')
+    assert 'thread connection' in values_of(statuses[-1])['reason']

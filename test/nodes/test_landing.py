@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import socket
+import time
 
 import numpy as np
 import pytest
@@ -177,3 +178,40 @@ def test_says_what_speaks_against_a_landing(state, told, telemetry_age_s, map_ag
     reason = reason_against(state, telemetry, telemetry_age_s, map_age_s, LandingParameters())
     assert word in reason
     assert bool(reason) == bool(word)
+
+
+def test_a_node_that_fails_stops_the_vehicle_and_says_so_last(bench, values_of):
+    statuses = listen(bench)
+    velocities = bench.heard(Twist, 'cmd_vel', qos.COMMAND)
+    node = bench.run(LandingNode, interface='twist')
+    flight = Flight(bench, node)
+    bench.until(lambda: call(bench, 'engage', flight).success, flight)
+
+    def moves():
+        last = velocities[-1].linear if velocities else None
+        return last is not None and (last.x, last.y, last.z) != (0.0, 0.0, 0.0)
+
+    bench.until(moves, flight)
+    node.fail(ZeroDivisionError('by nothing'))
+    node.fail(RuntimeError('a second one is not told'))
+    until_s = time.monotonic() + 1.0
+    while time.monotonic() < until_s:
+        flight()
+        time.sleep(0.02)
+    values = values_of(statuses[-1])
+    assert values['state'] == 'FAILED'
+    assert 'ZeroDivisionError: by nothing' in values['reason']
+    last = velocities[-1].linear
+    assert (last.x, last.y, last.z) == (0.0, 0.0, 0.0)
+    assert not call_failed(bench, flight).success
+
+
+def call_failed(bench, doing):
+    """Engage a node that has failed, at which the bench would raise."""
+    client = bench.peer.create_client(Trigger, '/landing/engage')
+    future = client.call_async(Trigger.Request())
+    until_s = time.monotonic() + 10.0
+    while not future.done() and time.monotonic() < until_s:
+        doing()
+        time.sleep(0.02)
+    return future.result()

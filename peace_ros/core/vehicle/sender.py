@@ -27,7 +27,7 @@ from peace_ros.core.vehicle.parameters import SenderParameters
 SLACK_S = 0.01
 """How late a tick may be without the dead-man being late."""
 JOIN_S = 2.0
-STUCK_PERIODS = 6
+STUCK_PERIODS = 8
 """A thread that has not begun a tick for so many periods is stuck or dead."""
 
 STUCK_TURNS = 3

@@ -85,7 +85,7 @@ FAULTS = (
     replace(
         _defect('stuck', 'The thread of the set-point sender stands still.'),
         expected=replace(FAILS, within_s=1.5, zero_within_s=1.2, ends_within_s=1.5),
-        behaviour='The main thread misses its heartbeat: as a defect, 0.3 s later.',
+        behaviour='The main thread misses the heartbeat for 0.4 s: then as after a defect.',
     ),
 )
 """In the order of the documentation."""
