@@ -38,6 +38,7 @@ def faults(
     json_file: Annotated[
         Path | None, typer.Option('--json', metavar='FILE', help='Write the report here.')
     ] = None,
+    repeat: Annotated[int, typer.Option(min=1, max=1000, help='Fly each fault so often.')] = 1,
     jobs: Annotated[
         int, typer.Option(min=1, max=16, help='Flights at a time; each needs about two cores.')
     ] = 1,
@@ -59,7 +60,7 @@ def faults(
     Exit status 0 only when each did what is documented, without an unsafe hand-over or a crash.
     """
     console = Console()
-    chosen = choose(only or ())
+    chosen = tuple(fault for fault in choose(only or ()) for _ in range(repeat))
     if show:
         for fault in FAULTS:
             console.print(f'{fault.group}/{fault.name}: {fault.goes_wrong}', style='bold')

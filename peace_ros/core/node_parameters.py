@@ -101,7 +101,7 @@ class LandingOptions:
         'tcp:HOST:PORT or /dev/NAME:BAUD',
     )
     dialect: str = parameter(
-        'auto', 'What kind of autopilot it is', choices=('auto', 'ardupilot', 'px4')
+        'auto', 'What kind of autopilot it is: auto, ardupilot, px4, or one that was registered'
     )
     rate: float = parameter(
         25.0, 'Rate of decisions, on the steady clock', unit='Hz', low=20.0, high=400.0

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reaches the vehicle in the background: a silent port is waited for, and said to be silent."""
+"""Opens the link to the vehicle in the background; while nothing is heard, it says so."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
 from peace_ros.core.domain import VehicleError
+from peace_ros.core.threads import GuardedThread, OnDefect
 
 _RETRY_S = 1.0
 _JOIN_S = 1.0
@@ -26,14 +27,17 @@ _Link = TypeVar('_Link', bound=Closable)
 
 
 class Connection(Generic[_Link]):
-    """Opens a link in a thread and goes on trying until it is there."""
+    """Opens a link in a thread, and tries again until it is open."""
 
-    def __init__(self, open_link: Callable[[], _Link], say: Callable[[str], None]) -> None:
+    def __init__(
+        self, open_link: Callable[[], _Link], say: Callable[[str], None], on_defect: OnDefect
+    ) -> None:
         """Begin to open.
 
         Args:
             open_link: Returns the link or raises VehicleError; may block for seconds.
             say: Takes the sentence of each failure; it limits how often it repeats itself.
+            on_defect: Takes what ended the thread, other than VehicleError.
 
         """
         self._open, self._say = open_link, say
@@ -41,7 +45,7 @@ class Connection(Generic[_Link]):
         self._stop = threading.Event()
         self._link: _Link | None = None
         self._problem = 'the autopilot has not been heard yet'
-        self._thread = threading.Thread(target=self._run, name='connection', daemon=True)
+        self._thread = GuardedThread(self._run, 'connection', on_defect)
         self._thread.start()
 
     @property

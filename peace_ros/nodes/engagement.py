@@ -4,15 +4,19 @@
 
 from __future__ import annotations
 
-import threading
+from collections.abc import Callable
 from typing import Protocol, cast
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from peace_ros.core.domain import VehicleError
+from peace_ros.core.threads import GuardedThread
 from peace_ros.core.vehicle import VehicleLink
+
+_JOIN_S = 2.0
 
 
 class Engageable(Protocol):
@@ -33,18 +37,22 @@ class Engageable(Protocol):
     def end_landing(self) -> bool:
         """End the landing; return whether one was under way."""
 
+    def fail(self, error: BaseException) -> None:
+        """Take what ended a thread."""
+
 
 class EngagementServices:
     """``~/engage`` and ``~/disengage``, and engaging once automatically where that is asked for.
 
-    A request for control may take seconds, and steps and heatmaps must go on meanwhile: the
-    services have a callback group of their own.
+    A request for control may take seconds, and steps and heatmaps must go on meanwhile: it has a
+    thread of its own, and the services have a callback group in which one waits for the other.
     """
 
     def __init__(self, node: Engageable, *, auto: bool) -> None:
         self._node = node
         self._auto_due = auto
         self._ros = cast('Node', node)
+        self._thread: GuardedThread | None = None
         beside = MutuallyExclusiveCallbackGroup()
         for name, callback in (('engage', self._on_engage), ('disengage', self._on_disengage)):
             self._ros.create_service(Trigger, f'~/{name}', callback, callback_group=beside)
@@ -53,17 +61,30 @@ class EngagementServices:
         """Engage once, in a thread, when that was asked for and a landing can begin."""
         if self._auto_due and not self._node.check_engagement():
             self._auto_due = False
-            threading.Thread(target=self._auto_engage, name='auto_engage', daemon=True).start()
+            self._start(lambda: self._engage(by_person=False))
 
-    def _auto_engage(self) -> None:
-        self._engage(by_person=False)
+    def close(self) -> None:
+        """Wait until nobody engages any more; the link must have been closed before."""
+        if self._thread is not None:
+            self._thread.join(timeout=_JOIN_S)
 
-    def _on_engage(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        problem = self._engage(by_person=True)
-        instead = self._node.hold_level() if problem else ''
-        problem = f'{problem}; {instead}' if instead else problem
+    def _start(self, work: Callable[[], object]) -> None:
+        self._thread = GuardedThread(work, 'engage', self._node.fail)
+        self._thread.start()
+
+    async def _on_engage(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        answer = Future()
+        self._start(lambda: answer.set_result(self._engage_for_person()))
+        problem: str = await answer
         response.success, response.message = not problem, problem or 'engaged'
         return response
+
+    def _engage_for_person(self) -> str:
+        problem = self._engage(by_person=True)
+        instead = self._node.hold_level() if problem else ''
+        return f'{problem}; {instead}' if instead else problem
 
     def _engage(self, *, by_person: bool) -> str:
         """Request control once; return why the landing did not begin, empty when it began."""

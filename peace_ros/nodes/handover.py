@@ -9,7 +9,8 @@ import time
 from collections.abc import Callable
 
 from peace_ros.core.domain import Site, VehicleError
-from peace_ros.core.vehicle import MavlinkLink
+from peace_ros.core.threads import GuardedThread, OnDefect
+from peace_ros.core.vehicle import VehicleLink
 
 _PERIOD_S = 0.1
 _ATTEMPTS = 3
@@ -21,17 +22,20 @@ class AfterHandover:
 
     Args:
         policy: ``hold``, ``land`` or ``landing_target``.
-        say: Takes a sentence about what became of it.
+        say: Takes a sentence about the result.
+        on_defect: Takes what ended the thread.
     """
 
-    def __init__(self, policy: str, say: Callable[[str], None]) -> None:
-        self._policy, self._say = policy, say
+    def __init__(
+        self, policy: str, say: Callable[[str], None], on_defect: OnDefect | None = None
+    ) -> None:
+        self._policy, self._say, self._on_defect = policy, say, on_defect
         self._site: Site | None = None
         self._begun = False
         self._ended = threading.Event()
         self._due_s = 0.0
 
-    def follow(self, link: MavlinkLink, site: Site | None, *, handed_over: bool) -> None:
+    def follow(self, link: VehicleLink, site: Site | None, *, handed_over: bool) -> None:
         """Do what is due; never blocks.
 
         Args:
@@ -48,15 +52,17 @@ class AfterHandover:
         if self._policy == 'landing_target':
             self._point(link)
         elif self._policy == 'land' and not self._begun:
-            self._begun, self._ended = True, threading.Event()
-            arguments = (link, self._ended)
-            threading.Thread(target=self._land, args=arguments, daemon=True).start()
+            self._begun, ended = True, threading.Event()
+            self._ended = ended
+            GuardedThread(
+                lambda: self._land(link, ended), 'after_handover', self._on_defect
+            ).start()
 
     def end(self) -> None:
         """Ask for nothing any more."""
         self._ended.set()
 
-    def _point(self, link: MavlinkLink) -> None:
+    def _point(self, link: VehicleLink) -> None:
         now_s = time.monotonic()
         told = link.telemetry()
         site = self._site
@@ -69,7 +75,7 @@ class AfterHandover:
         except VehicleError as error:
             self._say(f'LANDING_TARGET was not sent: {error}')
 
-    def _land(self, link: MavlinkLink, ended: threading.Event) -> None:
+    def _land(self, link: VehicleLink, ended: threading.Event) -> None:
         for _ in range(_ATTEMPTS):
             if ended.is_set():
                 return

@@ -7,7 +7,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import inf
 from typing import Any
 
@@ -39,7 +39,7 @@ class LandingNode(PeaceNode):
         """Subscribe, and begin to reach the vehicle.
 
         Raises:
-            ConfigurationError: parameters cannot be used.
+            PeaceError: parameters, connection or signing key cannot be used.
 
         """
         super().__init__('landing', *groups_of('landing'), **options)
@@ -63,6 +63,8 @@ class LandingNode(PeaceNode):
         self.get_logger().info(f'waiting for the vehicle: {self._access.name}')
 
     def _step(self) -> None:
+        if self.failure is not None:
+            return
         at_ns = self.clock_ns()
         with self._lock:
             link = self._access.link
@@ -115,19 +117,21 @@ class LandingNode(PeaceNode):
         return self._access.link
 
     def hold_level(self) -> str:
-        """Hold level where there is no position and that was chosen; return what became of it."""
+        """Hold level where there is no position and that was chosen; return the result."""
         return self._access.hold_level()
 
     def begin(self) -> str:
         """Begin the landing of a vehicle that obeys; return what speaks against it, or nothing."""
         with self._lock:
             link = self._access.link
-            if self._closed:
+            if self._closed or self.failure is not None:
                 return 'the node is ending'
             if link is None:
                 return self._access.problem or 'the vehicle is not reached yet'
             if self._sender is None:
-                self._sender = SetpointSender(link, parameters=self.filled(SenderParameters))
+                self._sender = SetpointSender(
+                    link, parameters=self.filled(SenderParameters), on_defect=self.fail
+                )
                 self._sender.start()
             self._sender.resume()
             self._core.engage()
@@ -144,18 +148,36 @@ class LandingNode(PeaceNode):
         return was_flying
 
     def close(self) -> None:
-        """Leave the vehicle standing: zero velocity, then silence."""
+        """Stop the vehicle: zero velocity, then no further set-point."""
         with self._lock:
             self._closed = True
             if self._sender is not None:
                 self._sender.stop()
                 self._access.stop_vehicle()
         self._access.close()
+        self._engagement.close()
+
+    def watch(self) -> None:
+        """Raise when the thread of the sender does not run."""
+        if self._sender is not None:
+            self._sender.watch()
+
+    def last_steps(self, sentence: str) -> tuple[Callable[[], None], ...]:
+        """Stop the vehicle, and publish why."""
+        return self._stop_at_once, lambda: self._publisher.publish_failure(
+            sentence, self.clock_ns()
+        )
+
+    def _stop_at_once(self) -> None:
+        if self._sender is not None:
+            self._sender.halt()
+        if self._state not in SILENT_STATES:
+            self._access.stop_at_once()
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
-    return run(LandingNode, args, threads=2)
+    return run(LandingNode, args)
 
 
 if __name__ == '__main__':

@@ -9,39 +9,33 @@ import signal
 import sys
 import threading
 import time
-import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from types import FrameType
 from typing import Any, TypeVar
 
 import rclpy
-from rclpy.executors import (
-    ExternalShutdownException,
-    MultiThreadedExecutor,
-    SingleThreadedExecutor,
-)
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 
 from peace_ros.core.domain import ConfigurationError, PeaceError
 from peace_ros.core.node_parameters import Group
+from peace_ros.nodes.failure import EXIT_FAILED, Failure
 from peace_ros.nodes.parameters import declare_parameters, refuse_unknown
+from peace_ros.nodes.spinning import spin_until_ended
 
 _Parameters = TypeVar('_Parameters')
 
 EXIT_OK = 0
-EXIT_FAILED = 1
 EXIT_REFUSED = 2
 _SAY_AGAIN_S = 5.0
-_SHUTDOWN_S = 2.0
+_WATCH_S = 0.1
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class PeaceNode(Node):  # type: ignore[misc]
-    """A node whose parameters are dataclasses and which knows when to repeat itself."""
+    """A node with dataclasses as parameters, which limits how often it repeats a warning."""
 
     def __init__(self, name: str, *groups: Group, **options: Any) -> None:
         """Create the node; refuse parameters that none of the dataclasses declares.
@@ -57,8 +51,7 @@ class PeaceNode(Node):  # type: ignore[misc]
         except PeaceError:
             self.destroy_node()
             raise
-        self.failure: Exception | None = None
-        """The defect of ours that ended a thread of this node, and with it the node."""
+        self._failure = Failure()
         self._endings: SimpleQueue[None] = SimpleQueue()
         """A queue, because a signal handler may put into it wherever it interrupts."""
         self._said: dict[str, float] = {}
@@ -84,18 +77,49 @@ class PeaceNode(Node):  # type: ignore[misc]
             self._said[subject] = now
         self.get_logger().warning(sentence)
 
-    def fail(self, error: Exception) -> None:
-        """Remember a defect of ours and end the process in an orderly way; see :func:`run`."""
-        self.failure = self.failure or error
-        self.end()
+    @property
+    def failure(self) -> BaseException | None:
+        """The defect that ended a thread of this node, and with it the node."""
+        return self._failure.error
+
+    def fail(self, error: BaseException) -> None:
+        """Take a defect that ended a thread, a timer or a callback; never blocks.
+
+        :meth:`last_steps` begin at once, and :func:`run` ends the process soon afterwards.
+        """
+        try:
+            self._failure.begin(error, self.last_steps)
+        finally:
+            self.end()
+
+    def last_steps(self, sentence: str) -> Sequence[Callable[[], None]]:  # noqa: ARG002
+        """Return what a node that has failed must still do at once.
+
+        Args:
+            sentence: what has failed.
+
+        """
+        return ()
+
+    def watch(self) -> None:
+        """Raise when something no longer runs; the main thread calls it every ``_WATCH_S``."""
 
     def end(self) -> None:
         """Let :meth:`wait_until_ended` return; from any thread or signal handler."""
         self._endings.put(None)
 
     def wait_until_ended(self) -> None:
-        """Block until the node shall end."""
-        self._endings.get()
+        """Block until the node shall end; a node that has failed ends the process from here."""
+        while self._endings.empty():
+            with suppress(Empty):
+                self._endings.get(timeout=_WATCH_S)
+                break
+            try:
+                self.watch()
+            except Exception as error:
+                self.fail(error)
+        if self.failure is not None:
+            self._failure.end_process()
 
     def close(self) -> None:
         """Stop threads and links; the node itself is destroyed by :func:`run`."""
@@ -109,15 +133,14 @@ def _interrupt(_number: int, _frame: FrameType | None) -> None:
     raise _Interrupted
 
 
-def run(
-    create: Callable[[], PeaceNode], args: Sequence[str] | None = None, threads: int = 1
-) -> int:
+def run(create: Callable[[], PeaceNode], args: Sequence[str] | None = None) -> int:
     """Create a node, spin it until SIGINT or SIGTERM, close it; return the exit status.
 
     0 after a signal; 2 with one sentence on standard error when the arguments, the
-    configuration, a model, a world or the vehicle cannot be used; 1 with a traceback for a
-    defect of ours. rclpy's own signal handlers would take the context away from under nodes that
-    still have something to say, so they are not installed.
+    configuration, a model, a world or the vehicle cannot be used. A defect ends the process with
+    status 1 and a traceback within a second, see :meth:`PeaceNode.fail`. rclpy's own signal
+    handlers would take the context away from under nodes that still have something to say, so
+    they are not installed.
     """
     for number in _SIGNALS:
         signal.signal(number, _interrupt)
@@ -129,10 +152,10 @@ def run(
         )
         node = create()
         _end_on_signals(node)
-        _spin_until_ended(node, threads)
+        spin_until_ended(node)
     except _Interrupted:
-        # Half a node can be neither used nor destroyed, and the threads of its middleware would
-        # abort an ordinary exit.
+        # A node that is not complete can be neither used nor destroyed, and the threads of its
+        # middleware would abort an ordinary exit.
         os._exit(EXIT_OK)
     except PeaceError as error:
         return _refused(error)
@@ -146,67 +169,17 @@ def run(
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
-    if node.failure is not None:
-        traceback.print_exception(node.failure)
-        return EXIT_FAILED
-    return EXIT_OK
+    return EXIT_OK if node.failure is None else EXIT_FAILED
 
 
 def _end_on_signals(node: PeaceNode) -> None:
-    """End by the front door from now on: an exception could strike in the middle of anything."""
+    """Shut down in order from now on: an exception could interrupt anything half done."""
 
     def end(_number: int, _frame: FrameType | None) -> None:
         node.end()
 
     for number in _SIGNALS:
         signal.signal(number, end)
-
-
-class _PatientExecutor(MultiThreadedExecutor):  # type: ignore[misc]
-    """Waits for the callbacks under way, which rclpy's own leaves running on a destroyed node."""
-
-    def shutdown(self, timeout_sec: float | None = None) -> bool:
-        self._executor.shutdown(wait=True)
-        return bool(super().shutdown(timeout_sec))
-
-
-class _Enough(Future):  # type: ignore[misc]
-    """Ends the spinning; keeps one callback, as rclpy adds another with every turn of its loop."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._is_watched = False
-
-    def add_done_callback(self, callback: Callable[[Future], None]) -> None:
-        """Keep the first: all of them wake the same executor."""
-        if not self._is_watched:
-            self._is_watched = True
-            super().add_done_callback(callback)
-
-
-def _spin_until_ended(node: PeaceNode, threads: int) -> None:
-    """Spin in a thread, because Python runs signal handlers only while its main thread is free."""
-    executor = SingleThreadedExecutor() if threads == 1 else _PatientExecutor(threads)
-    executor.add_node(node)
-    enough = _Enough()
-
-    def spin() -> None:
-        try:
-            with suppress(ExternalShutdownException):
-                executor.spin_until_future_complete(enough)
-        except Exception as error:
-            node.fail(error)
-        node.end()
-
-    spinner = threading.Thread(target=spin, name='spin', daemon=True)
-    spinner.start()
-    node.wait_until_ended()
-    # First no new callbacks, then links closed, so that those under way soon end, and only then
-    # may anything be destroyed.
-    enough.set_result(None)
-    spinner.join(timeout=_SHUTDOWN_S)
-    node.close()
-    executor.shutdown(timeout_sec=_SHUTDOWN_S)
 
 
 def _refused(error: Exception) -> int:

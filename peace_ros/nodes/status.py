@@ -24,7 +24,12 @@ from peace_ros.nodes.messages import (
 )
 from peace_ros.nodes.qos import RESULT
 
+FAILED = 'FAILED'
+"""In place of a state: a defect ends the node."""
 _STATUS_PERIOD_S = 0.1
+_LAST_WORDS = 5
+"""A subscriber may miss one message of a process that ends."""
+_LAST_WORDS_PERIOD_S = 0.04
 _CONCERNING = frozenset(
     {State.WAITING, State.CLIMBING, State.RESTARTING, State.RETURNING, State.HOLD}
 )
@@ -51,9 +56,12 @@ class DecisionPublisher:
         self._setpoint = node.create_publisher(TwistStamped, 'landing/setpoint', RESULT)
         self._site = node.create_publisher(PointStamped, 'landing/site', RESULT)
         self._status_due_s = 0.0
+        self._has_failed = False
 
     def publish(self, decision: Decision, situation: VehicleSituation, at_ns: int) -> None:
         """Publish a decision; the set-point always, the rest at 10 Hz of the steady clock."""
+        if self._has_failed:
+            return
         if decision.state not in SILENT_STATES:
             self._setpoint.publish(setpoint_to_twist_stamped(decision.setpoint, at_ns))
         now_s = time.monotonic()
@@ -65,6 +73,15 @@ class DecisionPublisher:
         if decision.site is not None and told is not None and told.pose is not None:
             ground_down_m = told.pose.down_m + told.pose.altitude_agl_m
             self._site.publish(site_to_message(decision.site, at_ns, ground_down_m))
+
+    def publish_failure(self, sentence: str, at_ns: int) -> None:
+        """Publish that the node has failed, several times; no decision is published afterwards."""
+        self._has_failed = True
+        pairs = {'state': FAILED, 'reason': sentence}.items()
+        words = f'{FAILED}: {sentence}'
+        for _ in range(_LAST_WORDS):
+            self._status.publish(diagnostic_array(at_ns, 'landing/status', ERROR, words, pairs))
+            time.sleep(_LAST_WORDS_PERIOD_S)
 
 
 def status_message(decision: Decision, situation: VehicleSituation, at_ns: int) -> DiagnosticArray:

@@ -17,6 +17,7 @@ from peace_ros.core.vehicle import Answer, RequestResult
 from peace_ros.nodes.messages import setpoint_to_body_twist
 
 _POSES = 256
+_NO_MODES = RequestResult(Answer.REFUSED, 'a vehicle with a velocity topic has no modes')
 
 
 class TwistLink:
@@ -39,6 +40,16 @@ class TwistLink:
     def taken_over(self) -> bool:
         """Nobody else commands."""
         return False
+
+    @property
+    def problem(self) -> str:
+        """Nothing: a topic is always there, and the age of the pose is looked at elsewhere."""
+        return ''
+
+    @property
+    def position_problem(self) -> str:
+        """Nothing."""
+        return ''
 
     def telemetry(self) -> Telemetry:
         """Return the newest pose as telemetry of an armed, obedient, flying vehicle."""
@@ -68,6 +79,17 @@ class TwistLink:
             pose = self._newest
         self._publish(Twist() if pose is None else setpoint_to_body_twist(setpoint, pose))
 
+    def send_landing_target(
+        self,
+        site_ned_m: tuple[float, float, float],  # noqa: ARG002
+        pose: Pose,  # noqa: ARG002
+    ) -> None:
+        """Raise VehicleError: there is nobody to tell."""
+        raise VehicleError('a vehicle with a velocity topic takes no LANDING_TARGET: choose hold')
+
+    def report_health(self, mav_state: int) -> None:
+        """Do nothing: nobody listens."""
+
     def request_control(self, *, by_person: bool = False) -> RequestResult:  # noqa: ARG002
         """Accept: there is nobody to ask."""
         return RequestResult(Answer.ACCEPTED)
@@ -76,6 +98,19 @@ class TwistLink:
         """Stop; the simulator holds by itself."""
         self._publish(Twist())
         return RequestResult(Answer.ACCEPTED)
+
+    def request_land(self) -> RequestResult:
+        """Refuse: such a vehicle has no modes."""
+        return _NO_MODES
+
+    def request_level_hold(self) -> RequestResult:
+        """Refuse: such a vehicle has no modes."""
+        return _NO_MODES
+
+    def stop_at_once(self) -> bool:
+        """Stop the vehicle."""
+        self._publish(Twist())
+        return True
 
     def close(self) -> None:
         """Stop the vehicle."""

@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, Twist
@@ -14,7 +16,7 @@ from peace_ros.core.domain import ConfigurationError, Pose, Setpoint, VehicleErr
 from peace_ros.core.landing import Decision, State
 from peace_ros.core.messages import pose_from_message, pose_from_transform
 from peace_ros.core.node_parameters import LandingOptions
-from peace_ros.core.vehicle import MavlinkLink, VehicleLink, VehicleParameters, open_vehicle
+from peace_ros.core.vehicle import VehicleLink, VehicleParameters, check_access, open_vehicle
 from peace_ros.nodes.connection import Connection
 from peace_ros.nodes.handover import AfterHandover
 from peace_ros.nodes.qos import COMMAND, POSE_IN
@@ -24,6 +26,9 @@ from peace_ros.nodes.twist_link import TwistLink
 _TRY_S = 3.0
 """One attempt to hear an autopilot; between attempts the node says that it hears none."""
 _LAST_ZEROS = 3
+_STOP_S = 0.6
+"""How long a vehicle that does not show its hold mode is asked for it again."""
+_STOP_PERIOD_S = 0.05
 _HEALTH: dict[State, int] = {
     State.IDLE: mavlink.MAV_STATE_STANDBY,
     State.ABORTED: mavlink.MAV_STATE_STANDBY,
@@ -38,10 +43,17 @@ class VehicleAccess:
     def __init__(
         self, node: PeaceNode, options: LandingOptions, parameters: VehicleParameters
     ) -> None:
+        """Begin to reach the vehicle.
+
+        Raises:
+            ConfigurationError: the signing key cannot be read, or tf is not installed.
+            VehicleError: the connection or the dialect is not understood.
+
+        """
         self._node = node
         self._parameters = parameters
         self._after = AfterHandover(
-            parameters.after_handover, lambda sentence: node.say('handover', sentence)
+            parameters.after_handover, lambda sentence: node.say('handover', sentence), node.fail
         )
         self._connection: Connection[VehicleLink] | None = None
         self._twist: TwistLink | None = None
@@ -51,19 +63,23 @@ class VehicleAccess:
             self._subscribe_pose(options)
             return
         self.name = options.mavlink
+        check_access(options.mavlink, options.dialect, parameters.signing_key_file)
         timeout_s = min(_TRY_S, parameters.connect_timeout_s)
 
-        def open_link() -> VehicleLink:
-            return open_vehicle(
-                options.mavlink, options.dialect, node.clock_ns, parameters, timeout_s
-            )
-
-        self._connection = Connection(open_link, lambda sentence: node.say('vehicle', sentence))
+        open_link = partial(
+            open_vehicle,
+            *(options.mavlink, options.dialect, node.clock_ns, parameters, timeout_s, node.fail),
+        )
+        self._connection = Connection(
+            open_link, lambda sentence: node.say('vehicle', sentence), node.fail
+        )
 
     @property
     def link(self) -> VehicleLink | None:
         """The vehicle, None until it is reached."""
-        return self._twist if self._connection is None else self._connection.link
+        if self._connection is None:
+            return self._twist
+        return self._connection.link
 
     @property
     def problem(self) -> str:
@@ -74,14 +90,14 @@ class VehicleAccess:
     def vehicle_problem(self) -> str:
         """Why a landing cannot begin as far as the vehicle is concerned, empty when it can."""
         link = self.link
-        if self.problem or not isinstance(link, MavlinkLink):
+        if link is None:
             return self.problem
         return link.problem or link.position_problem
 
     def follow(self, decision: Decision) -> None:
-        """Tell the vehicle how we are, and do what follows a hand-over; once per step."""
+        """Report our health to the vehicle, and do what follows a hand-over; once per step."""
         link = self.link
-        if not isinstance(link, MavlinkLink):
+        if link is None:
             return
         if link.problem:
             self._node.say('vehicle', link.problem)
@@ -90,12 +106,12 @@ class VehicleAccess:
         self._after.follow(link, decision.site, handed_over=handed_over)
 
     def hold_level(self) -> str:
-        """Hold level without a position where that was chosen; return what became of it.
+        """Hold level without a position where that was chosen; return the result.
 
         Empty when it was not chosen, or when there is a position or no flying vehicle.
         """
         link = self.link
-        if not self._parameters.attitude_fallback or not isinstance(link, MavlinkLink):
+        if link is None or not self._parameters.attitude_fallback:
             return ''
         told = link.telemetry()
         if not link.position_problem or not told.armed or told.landed:
@@ -118,6 +134,18 @@ class VehicleAccess:
                 link.send_velocity(Setpoint(stamp_ns=0))
         except VehicleError as error:
             self._node.say('vehicle', str(error))
+
+    def stop_at_once(self) -> None:
+        """Ask for zero velocity and hold until the vehicle holds; for a node that has failed."""
+        self._after.end()
+        link, until_s = self.link, time.monotonic() + _STOP_S
+        while link is not None and time.monotonic() < until_s:
+            try:
+                if not link.stop_at_once():
+                    return
+            except VehicleError:
+                pass  # the next try may find the line open again
+            time.sleep(_STOP_PERIOD_S)
 
     def close(self) -> None:
         """Release the line."""

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from peace_ros.core.domain import PeaceError
+from peace_ros.core.threads import GuardedThread, OnDefect
 
 _Item = TypeVar('_Item')
 _JOIN_S = 2.0
@@ -17,25 +18,25 @@ _JOIN_S = 2.0
 class NewestWorker(Generic[_Item]):
     """A thread that works on the newest item; what comes while it works replaces what waits.
 
-    So a slow model loses frames and never gathers latency. A PeaceError of the work is handed
-    to ``complain`` and the thread goes on; any other exception is a defect of ours: it ends the
-    process through ``fail``, because a node that silently stopped would be worse.
+    So a slow model drops frames and never accumulates latency. A PeaceError of the work is handed
+    to ``complain`` and the thread goes on; any other exception is a defect: it ends the process
+    through ``fail``, because a node that silently stopped would be worse.
     """
 
     def __init__(
         self,
         work: Callable[[_Item], None],
         complain: Callable[[PeaceError], None],
-        fail: Callable[[Exception], None],
+        fail: OnDefect,
         name: str,
     ) -> None:
-        self._work, self._complain, self._fail = work, complain, fail
+        self._work, self._complain = work, complain
         self._ready = threading.Condition()
         self._waiting: list[_Item] = []
         self._stopping = False
         self.dropped = 0
         """Items that were replaced before they were worked on."""
-        self._thread = threading.Thread(target=self._loop, name=name, daemon=True)
+        self._thread = GuardedThread(self._loop, name, fail)
         self._thread.start()
 
     def offer(self, item: _Item) -> None:
@@ -60,15 +61,10 @@ class NewestWorker(Generic[_Item]):
 
     def _loop(self) -> None:
         while (item := self._next()) is not None:
-            if not self._survives(item):
-                return
+            self._do(item)
 
-    def _survives(self, item: _Item) -> bool:
+    def _do(self, item: _Item) -> None:
         try:
             self._work(item)
         except PeaceError as error:
             self._complain(error)
-        except Exception as error:
-            self._fail(error)
-            return False
-        return True

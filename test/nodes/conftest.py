@@ -47,9 +47,9 @@ class Bench:
         self._executors = []
         self._threads = []
         self._nodes: list[PeaceNode] = []
-        self._spin(self.peer)
+        self.spin(self.peer)
 
-    def _spin(self, node: Any) -> None:
+    def spin(self, node: Any) -> None:
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         thread = threading.Thread(target=executor.spin, daemon=True)
@@ -60,7 +60,7 @@ class Bench:
     def run(self, create: Callable[..., PeaceNode], *given: Any, **parameters: Any) -> PeaceNode:
         node = create(*given, parameter_overrides=overrides(**parameters))
         self._nodes.append(node)
-        self._spin(node)
+        self.spin(node)
         return node
 
     def heard(self, kind: Any, topic: str, profile: Any) -> list[Any]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import socket
+import time
 
 import numpy as np
 import pytest
@@ -73,13 +74,6 @@ def test_a_silent_port_is_a_hold_with_a_reason_and_nothing_engages(bench, values
     answer = call(bench, 'engage')
     assert not answer.success
     assert 'HEARTBEAT' in answer.message
-
-
-def test_a_wrong_url_is_a_hold_with_a_reason(bench, values_of):
-    statuses = listen(bench)
-    bench.run(LandingNode, mavlink='nonsense')
-    bench.until(lambda: bool(statuses) and "'nonsense'" in statuses[-1].status[0].message)
-    assert state_of(statuses, values_of) == 'HOLD'
 
 
 def test_refuses_to_engage_without_telemetry_and_without_heatmaps(bench):
@@ -155,3 +149,40 @@ def test_tf_needs_the_package_that_the_wheels_lack(bench):
     except ImportError:
         with pytest.raises(ConfigurationError, match='tf2_msgs'):
             bench.run(LandingNode, interface='twist', pose_source='tf')
+
+
+def test_a_node_that_fails_stops_the_vehicle_and_says_so_last(bench, values_of):
+    statuses = listen(bench)
+    velocities = bench.heard(Twist, 'cmd_vel', qos.COMMAND)
+    node = bench.run(LandingNode, interface='twist')
+    flight = Flight(bench, node)
+    bench.until(lambda: call(bench, 'engage', flight).success, flight)
+
+    def moves():
+        last = velocities[-1].linear if velocities else None
+        return last is not None and (last.x, last.y, last.z) != (0.0, 0.0, 0.0)
+
+    bench.until(moves, flight)
+    node.fail(ZeroDivisionError('by nothing'))
+    node.fail(RuntimeError('a second one is not told'))
+    until_s = time.monotonic() + 1.0
+    while time.monotonic() < until_s:
+        flight()
+        time.sleep(0.02)
+    values = values_of(statuses[-1])
+    assert values['state'] == 'FAILED'
+    assert 'ZeroDivisionError: by nothing' in values['reason']
+    last = velocities[-1].linear
+    assert (last.x, last.y, last.z) == (0.0, 0.0, 0.0)
+    assert not call_failed(bench, flight).success
+
+
+def call_failed(bench, doing):
+    """Engage a node that has failed, at which the bench would raise."""
+    client = bench.peer.create_client(Trigger, '/landing/engage')
+    future = client.call_async(Trigger.Request())
+    until_s = time.monotonic() + 10.0
+    while not future.done() and time.monotonic() < until_s:
+        doing()
+        time.sleep(0.02)
+    return future.result()

@@ -25,11 +25,11 @@ REBOOT_MS = 1000
 """A boot time that goes back by more than this is a reboot."""
 MAX_POSES = 256
 ESTIMATOR_LIMIT_S = 3.0
-"""Age at which what the position filter said of itself is no longer known."""
+"""Age at which the report of the position filter about itself is stale."""
 KNOWS_POSITION = mavlink.ESTIMATOR_POS_HORIZ_REL | mavlink.ESTIMATOR_POS_HORIZ_ABS
 GUESSES_POSITION = mavlink.ESTIMATOR_CONST_POS_MODE
 IN_ORDER = frozenset({'LOCAL_POSITION_NED', 'ATTITUDE', 'ATTITUDE_QUATERNION'})
-"""Of these only the newest counts, whatever order they come in."""
+"""Of these only the newest is used, in whatever order they are received."""
 NUMBERS = {
     'LOCAL_POSITION_NED': ('x', 'y', 'z', 'vx', 'vy', 'vz'),
     'ATTITUDE': ('roll', 'pitch', 'yaw'),
@@ -46,7 +46,7 @@ class _Position:
 
 
 class Assembler:
-    """Keeps the newest of every part; values that are no numbers are counted, never used.
+    """Keeps the newest of every part; values that are not numbers are counted, never used.
 
     Args:
         dialect: Of the autopilot.
@@ -64,9 +64,9 @@ class Assembler:
         self.poses: deque[Pose] = deque(maxlen=MAX_POSES)
         self.texts = StatusTexts()
         self.rejected = 0
-        """Messages with numbers that are none, or attitudes that are no rotation."""
+        """Messages with values that are not numbers, or with attitudes that are not rotations."""
         self.late = 0
-        """Messages that came twice, or after a newer one."""
+        """Messages that were received twice, or after a newer one."""
         self.reboots = 0
         self.arrived_ns: dict[int, int] = {}
         """Message id -> steady clock of the newest."""
@@ -80,7 +80,7 @@ class Assembler:
         self._forget()
 
     def _forget(self) -> None:
-        """Forget what a reboot makes worthless; mode and armed hold until the next HEARTBEAT."""
+        """Forget what a reboot invalidates; mode and armed stay valid until the next HEARTBEAT."""
         self._position: _Position | None = None
         self._pose: Pose | None = None
         self._pose_ns = 0
@@ -162,7 +162,7 @@ class Assembler:
         return self._watch.problem
 
     def telemetry(self, steady_ns: int) -> Telemetry:
-        """Return what is known now; a pose that is too old or not to be believed is None."""
+        """Return what is known now; a pose that is too old or rejected is None."""
         p = self._parameters
         pose, problem = self._pose, self._doubt(steady_ns)
         if pose is None or problem or steady_ns - self._pose_ns > p.pose_limit_s * 1e9:
@@ -186,12 +186,12 @@ class Assembler:
         )
 
     def _doubt(self, steady_ns: int) -> str:
-        """Return why nothing that was said of the position is believed, empty when it is."""
+        """Return why the reported position is rejected, empty when it is accepted."""
         problem = self.position_problem(steady_ns)
         limit_s, age_s = self._parameters.heartbeat_limit_s, self.heartbeat_age_s(steady_ns)
         if problem or self._heartbeat_ns is None or age_s <= limit_s:
             return problem
-        return f'HEARTBEAT is {age_s:.1f} s old, limit {limit_s:g} s: nobody knows who flies'
+        return f'HEARTBEAT is {age_s:.1f} s old, limit {limit_s:g} s: it is unknown who controls it'
 
     def _estimator_flags(self, steady_ns: int) -> int | None:
         if self._estimator is None:
@@ -256,7 +256,7 @@ class Assembler:
         self.poses.append(self._pose)
 
     def _make_bare_pose(self, q: Quaternion, boot_ms: int, stamp_ns: int, steady_ns: int) -> None:
-        """Tell attitude and altitude alone, by which pictures can stand in for the position."""
+        """Report attitude and altitude only; images may replace the position."""
         height = self._height
         limit_ns = self._parameters.pose_limit_s * 1e9
         if height is None or steady_ns - height.steady_ns > limit_ns or self._watch.problem:

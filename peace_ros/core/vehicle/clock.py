@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The autopilot's clock in terms of ours: TIMESYNC round trips, the quickest of which are believed.
+"""Maps the autopilot's clock to ours by TIMESYNC round trips, of which the quickest are used.
 
 Pure: clocks are handed in. An answer that took long says little about when it was given, so the
 offset is the median over the round trips that were nearly as quick as the quickest.
@@ -13,7 +13,7 @@ from statistics import median
 
 WINDOW = 40
 FEWEST = 3
-"""Round trips before an offset is believed."""
+"""Round trips before an offset is used."""
 KNOWN = 3 * FEWEST
 """Round trips after which the clocks are asked for less often."""
 QUICK_NS = 2_000_000
@@ -24,7 +24,7 @@ STEP_NS = 50_000_000
 """A deviation beyond this and beyond the round trip is a step of one of the clocks."""
 STEPS_TO_BELIEVE = 3
 OLDEST_NS = 1_000_000_000
-"""A message that seems older than this at receipt was not: the clocks do not fit."""
+"""A message that seems older than this at receipt proves that the offset is wrong."""
 AHEAD_NS = 20_000_000
 """Resolution of the clocks: so much in the future is still now."""
 

@@ -1,15 +1,15 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whose the vehicle is: a mode that we did not ask for is somebody else's; pure."""
+"""Who is in control of the vehicle: a mode that we did not request means somebody else; pure."""
 
 from __future__ import annotations
 
 GRACE_NS = 1_000_000_000
-"""How much later than the end of a request its mode may still show."""
+"""How long after the end of a request its mode may still be reported."""
 
 
 class Control:
-    """Tells a mode that we left on purpose from one that was taken from us."""
+    """Distinguishes a mode that we left on purpose from a takeover."""
 
     def __init__(self) -> None:
         self.taken_over = False
@@ -18,11 +18,11 @@ class Control:
         self._leaving_until_ns = 0
 
     def ask_anew(self) -> None:
-        """A person wants us to fly: what happened before no longer counts."""
+        """A person requests control anew: an earlier takeover no longer counts."""
         self.taken_over = False
 
     def leave_to(self, mode: str, until_ns: int) -> None:
-        """We are about to ask for another mode ourselves, which must show until then."""
+        """Note that we request another mode ourselves, which must be reported until then."""
         self._leaving_to, self._leaving_until_ns = mode, until_ns + GRACE_NS
 
     def stay(self) -> None:
@@ -30,7 +30,7 @@ class Control:
         self._leaving_until_ns = 0
 
     def left_for(self, mode: str, now_ns: int) -> None:
-        """See that the mode that obeyed us was left for another one."""
+        """Note that the mode in which the vehicle obeys us was left for another one."""
         if now_ns > self._leaving_until_ns or mode != self._leaving_to:
             self.taken_over = True
         self._leaving_until_ns = 0

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from math import atan2, cos, hypot, sin
 from typing import Any, Protocol
 
@@ -27,7 +28,7 @@ ModeCommand = Vector
 
 
 class Dialect(Protocol):
-    """One autopilot's way of speaking."""
+    """The modes and messages of one kind of autopilot."""
 
     @property
     def name(self) -> str:
@@ -178,33 +179,11 @@ def _unknown_mode(mode: str, known: list[str]) -> VehicleError:
 
 
 ARDUCOPTER_MODES: dict[str, int] = {
-    'STABILIZE': 0,
-    'ACRO': 1,
-    'ALT_HOLD': 2,
-    'AUTO': 3,
-    'GUIDED': 4,
-    'LOITER': 5,
-    'RTL': 6,
-    'CIRCLE': 7,
-    'LAND': 9,
-    'DRIFT': 11,
-    'SPORT': 13,
-    'FLIP': 14,
-    'AUTOTUNE': 15,
-    'POSHOLD': 16,
-    'BRAKE': 17,
-    'THROW': 18,
-    'AVOID_ADSB': 19,
-    'GUIDED_NOGPS': 20,
-    'SMART_RTL': 21,
-    'FLOWHOLD': 22,
-    'FOLLOW': 23,
-    'ZIGZAG': 24,
-    'SYSTEMID': 25,
-    'AUTOROTATE': 26,
-    'AUTO_RTL': 27,
-    'TURTLE': 28,
+    entry.name.removeprefix('COPTER_MODE_'): number
+    for number, entry in mavlink.enums['COPTER_MODE'].items()
+    if number != mavlink.COPTER_MODE_ENUM_END
 }
+_ARDUCOPTER_NAMES = {number: name for name, number in ARDUCOPTER_MODES.items()}
 
 
 @dataclass(frozen=True)
@@ -222,13 +201,10 @@ class ArduPilot:
     height_message: int = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
     home_is_local: bool = False
     heartbeat_rate_hz: float = 0.0
-    _names: dict[int, str] = field(
-        default_factory=lambda: {number: name for name, number in ARDUCOPTER_MODES.items()}
-    )
 
     def mode_name(self, custom_mode: int) -> str:
         """Return e.g. GUIDED; MODE 99 for one that is not known."""
-        return self._names.get(custom_mode, f'MODE {custom_mode}')
+        return _ARDUCOPTER_NAMES.get(custom_mode, f'MODE {custom_mode}')
 
     def mode_command(self, mode: str) -> ModeCommand:
         """Return (flags, mode number, 0)."""
@@ -261,6 +237,7 @@ PX4_MODES: dict[str, tuple[int, int]] = {
     'STABILIZED': (7, 0),
 }
 """Main and sub mode: bits 16 to 23 and 24 to 31 of custom_mode (PX4 px4_custom_mode.h)."""
+_PX4_NAMES = {numbers: name for name, numbers in PX4_MODES.items()}
 
 
 @dataclass(frozen=True)
@@ -278,14 +255,11 @@ class Px4:
     height_message: int = mavlink.MAVLINK_MSG_ID_ALTITUDE
     home_is_local: bool = True
     heartbeat_rate_hz: float = 5.0
-    _names: dict[tuple[int, int], str] = field(
-        default_factory=lambda: {numbers: name for name, numbers in PX4_MODES.items()}
-    )
 
     def mode_name(self, custom_mode: int) -> str:
         """Return e.g. OFFBOARD; MODE 4.9 for one that is not known."""
         main, sub = (custom_mode >> 16) & 0xFF, (custom_mode >> 24) & 0xFF
-        return self._names.get((main, sub), f'MODE {main}.{sub}')
+        return _PX4_NAMES.get((main, sub), f'MODE {main}.{sub}')
 
     def mode_command(self, mode: str) -> ModeCommand:
         """Return (flags, main mode, sub mode)."""
@@ -304,7 +278,12 @@ class Px4:
         return _landing_target(mavlink.MAV_FRAME_LOCAL_NED, site_ned_m, body_m, stamp_us)
 
 
-DIALECTS = ('auto', 'ardupilot', 'px4')
+AUTO = 'auto'
+_DIALECTS: dict[str, Callable[[str], Dialect]] = {
+    'ardupilot': ArduPilot,
+    'px4': lambda _hold_mode: Px4(),
+}
+"""Name -> dialect, given ArduPilot's mode for holding position; the first that fits is taken."""
 NO_MULTICOPTERS = {
     mavlink.MAV_TYPE_FIXED_WING: 'a fixed-wing aircraft',
     mavlink.MAV_TYPE_ANTENNA_TRACKER: 'an antenna tracker',
@@ -318,6 +297,32 @@ VTOL_TYPES = range(19, 26)
 """MAV_TYPE_VTOL_...; their names differ between versions of pymavlink."""
 
 
+def register_dialect(name: str, make: Callable[[str], Dialect]) -> None:
+    """Make another dialect known by a name, before the vehicle is opened.
+
+    Args:
+        name: What parameter ``dialect`` takes.
+        make: Returns the dialect, given parameter ``vehicle.hold_mode``.
+
+    Raises:
+        VehicleError: The name is taken.
+    """
+    if name in dialect_names():
+        raise VehicleError(f'dialect {name!r} exists already: choose another name')
+    _DIALECTS[name] = make
+
+
+def dialect_names() -> tuple[str, ...]:
+    """Return what may be asked for: ``auto`` and the registered names."""
+    return (AUTO, *_DIALECTS)
+
+
+def check_dialect(wanted: str) -> None:
+    """Raise VehicleError for a name that is not known."""
+    if wanted not in dialect_names():
+        raise VehicleError(f'dialect {wanted!r}: choose one of {", ".join(dialect_names())}')
+
+
 def choose_dialect(
     wanted: str,
     autopilot: int,
@@ -327,7 +332,7 @@ def choose_dialect(
     """Return the dialect of the autopilot that was heard.
 
     Args:
-        wanted: ``auto``, ``ardupilot`` or ``px4``.
+        wanted: One of :func:`dialect_names`.
         autopilot: MAV_AUTOPILOT of its HEARTBEAT.
         hold_mode: ArduPilot's mode for holding position.
         vehicle_type: MAV_TYPE of its HEARTBEAT.
@@ -336,8 +341,7 @@ def choose_dialect(
         VehicleError: Unknown name, the autopilot heard is another one than was asked for, or its
             vehicle is no multicopter.
     """
-    if wanted not in DIALECTS:
-        raise VehicleError(f'dialect {wanted!r}: choose one of {", ".join(DIALECTS)}')
+    check_dialect(wanted)
     kind = NO_MULTICOPTERS.get(vehicle_type, '')
     if autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA and vehicle_type in VTOL_TYPES:
         kind = 'a VTOL, which ArduPlane flies'
@@ -346,11 +350,9 @@ def choose_dialect(
             f'the vehicle heard is {kind} (MAV_TYPE {vehicle_type}): connect to a multicopter or '
             'a helicopter'
         )
-    known: tuple[Dialect, ...] = (ArduPilot(hold_mode=hold_mode), Px4())
-    for dialect in known:
+    makers = list(_DIALECTS.values()) if wanted == AUTO else [_DIALECTS[wanted]]
+    for dialect in (make(hold_mode) for make in makers):
         if dialect.autopilot == autopilot:
-            if wanted not in {'auto', dialect.name}:
-                break
             return dialect
     raise VehicleError(
         f'the autopilot heard is of type {autopilot} (MAV_AUTOPILOT) and does not speak '

@@ -31,11 +31,11 @@ class HomeHeight:
         """Home below the origin; None until it is known."""
 
     def take_home(self, msl_m: float, down_m: float, *, flying: bool) -> bool:
-        """Take HOME_POSITION; False when it moved in flight and is not believed."""
+        """Take HOME_POSITION; False when it moved in flight and is rejected."""
         return self._take(msl_m, self._origin_msl_m, down_m, flying=flying)
 
     def take_origin(self, msl_m: float, *, flying: bool) -> bool:
-        """Take GPS_GLOBAL_ORIGIN; False when it moved in flight and is not believed."""
+        """Take GPS_GLOBAL_ORIGIN; False when it moved in flight and is rejected."""
         return self._take(self.home_msl_m, msl_m, self._told_m, flying=flying)
 
     def _take(
@@ -45,7 +45,7 @@ class HomeHeight:
         if not self._is_local and home_m is not None and origin_m is not None:
             down_m = origin_m - home_m
         known_m = self.down_m
-        # The first word about the origin is no motion of home.
+        # The first report of the origin does not mean that home moved.
         learns = not self._is_local and self._origin_msl_m is None and origin_m is not None
         moves = known_m is not None and down_m is not None and abs(down_m - known_m) > HOME_STEP_M
         if flying and moves and not learns:

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the link says by itself: HEARTBEAT with our health, TIMESYNC, requests for streams."""
+"""What the link sends on its own: HEARTBEAT with our health, TIMESYNC, requests for streams."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Housekeeping:
         """Set once the autopilot is known."""
 
     def set_health(self, mav_state: int) -> None:
-        """Say MAV_STATE in HEARTBEAT from now on; a change is told at once."""
+        """Report MAV_STATE in HEARTBEAT from now on; a change is sent at once."""
         if mav_state != self._health:
             self._health = mav_state
             self._heartbeat_due_ns = 0

@@ -18,7 +18,7 @@ RECONNECT_S = 1.0
 
 
 class LastingTransport:
-    """Behaves as the transport that it opens, but survives its end.
+    """Behaves as the transport that it opens, and opens it again after a failure.
 
     Args:
         url: See :func:`peace_ros.core.vehicle.transport.open_transport`.
@@ -44,7 +44,7 @@ class LastingTransport:
         self._pause_s = FIRST_PAUSE_S
         self._again_s = 0.0
         self.openings = 1
-        """Grows whenever the line was opened: what was half read is worthless then."""
+        """Grows whenever the line was opened: partly read messages are invalid then."""
 
     @property
     def problem(self) -> str:
@@ -88,7 +88,7 @@ class LastingTransport:
     def _break(self, line: Transport, problem: str) -> None:
         with self._lock:
             if self._line is not line:
-                return  # the other thread has noticed first
+                return  # the other thread was first
             self._line = None
             self._problem = problem
             self._again_s = self._steady_s() + self._pause_s

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The link: one thread reads and keeps house, requests wait for their answer with a limit."""
+"""The link: one thread reads and sends what is periodic; requests wait for an answer, limited."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain.errors import VehicleError
 from peace_ros.core.domain.motion import Pose, Setpoint, Telemetry
+from peace_ros.core.threads import GuardedThread, OnDefect, print_defect
 from peace_ros.core.vehicle.assembler import Assembler
 from peace_ros.core.vehicle.clock import TimeMap
 from peace_ros.core.vehicle.control import Control
@@ -33,19 +34,22 @@ from peace_ros.core.vehicle.wire import Wire
 
 READ_S = 0.02
 ZERO_STREAM_NS = 50_000_000
+OBEDIENCE_NS = 20_000_000
+"""The obedience watch looks this often, also while nothing is heard."""
 PRE_STREAM_S = 0.6
 THRUST_AS_THRUST = 8
 """Bit of ArduCopter's GUID_OPTIONS with which thrust no longer means climb rate."""
 
 
 class MavlinkLink:
-    """Talks to one autopilot, and believes no other.
+    """Talks to one autopilot, and ignores all others.
 
     Args:
         transport: An open line; the link closes it.
-        dialect: ``auto``, ``ardupilot`` or ``px4``.
+        dialect: ``auto`` or a name among the registered ones.
         parameters: Rates and limits.
         clock_ns: Node clock; poses are stamped with it.
+        on_defect: Takes what ended the reading thread.
 
     Raises:
         ConfigurationError: The signing key cannot be read.
@@ -58,6 +62,7 @@ class MavlinkLink:
         dialect: str,
         parameters: VehicleParameters,
         clock_ns: Callable[[], int],
+        on_defect: OnDefect | None = None,
     ) -> None:
         self._transport = transport
         self._wanted_dialect = dialect
@@ -83,8 +88,10 @@ class MavlinkLink:
         self._stream_due_ns = 0
         self._holding_level = False
         self._bytes_heard = 0
-        self._thread = threading.Thread(target=self._run, name='mavlink_link', daemon=True)
         self._obedience = ObedienceWatch()
+        self._obedience_due_ns = 0
+        self._report = on_defect or print_defect
+        self._thread = GuardedThread(self._run, 'mavlink_link', self._on_defect)
         self._thread.start()
         self._await_autopilot()
 
@@ -103,6 +110,8 @@ class MavlinkLink:
     @property
     def problem(self) -> str:
         """Why the vehicle cannot be reached now, empty when it can."""
+        if self._thread.defect is not None:
+            return f'the thread that reads the autopilot has ended: {self._thread.defect!r}'
         if self._transport.problem:
             return self._transport.problem
         limit_s = self._parameters.heartbeat_limit_s
@@ -110,7 +119,8 @@ class MavlinkLink:
             age_s = self._heard().heartbeat_age_s(time.monotonic_ns())
         if age_s <= limit_s:
             return ''
-        return f'no HEARTBEAT of the autopilot for {age_s:.0f} s, limit {limit_s} s: is it there?'
+        age = f'{age_s:.0f} s, limit {limit_s} s'
+        return f'no HEARTBEAT of the autopilot for {age}: check its power and the line'
 
     @property
     def position_problem(self) -> str:
@@ -121,7 +131,7 @@ class MavlinkLink:
 
     @property
     def ignored(self) -> int:
-        """Messages of others than the believed autopilot."""
+        """Messages of other systems than the chosen autopilot."""
         return self._peer.ignored
 
     @property
@@ -131,19 +141,19 @@ class MavlinkLink:
 
     @property
     def rejected(self) -> int:
-        """Messages of the autopilot that were not believed: numbers that are none."""
+        """Messages of the autopilot that were rejected: values that are not numbers."""
         with self._changed:
             return self._heard().rejected
 
     @property
     def late(self) -> int:
-        """Messages that came twice or out of order, and were dropped."""
+        """Messages that were received twice or out of order, and dropped."""
         with self._changed:
             return self._heard().late
 
     @property
     def clock(self) -> TimeMap:
-        """The autopilot's clock in terms of ours, for looking at."""
+        """The map from the autopilot's clock to ours, for inspection."""
         return self._clock
 
     @property
@@ -161,14 +171,7 @@ class MavlinkLink:
     def telemetry(self) -> Telemetry:
         """Return what the autopilot last said."""
         with self._changed:
-            heard = self._heard()
-            told = heard.telemetry(time.monotonic_ns())
-            if not told.in_control:
-                self._obedience.forget()
-            at = told.pose
-            position_m = None if at is None else (at.north_m, at.east_m, -at.altitude_agl_m)
-            reported_ns = heard.arrived_ns.get(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 0)
-            self._obedience.take(position_m, reported_ns, heard.reported_ns)
+            told = self._heard().telemetry(time.monotonic_ns())
             problem = self._obedience.problem
             return replace(told, pose=None, position_problem=problem) if problem else told
 
@@ -188,7 +191,7 @@ class MavlinkLink:
             return [text for _, text in self._heard().texts.entries]
 
     def report_health(self, mav_state: int) -> None:
-        """Say MAV_STATE in our HEARTBEAT from now on; a change is told at once."""
+        """Report MAV_STATE in our HEARTBEAT from now on; a change is sent at once."""
         self._house.set_health(mav_state)
 
     def send_velocity(self, setpoint: Setpoint) -> None:
@@ -238,6 +241,30 @@ class MavlinkLink:
     def request_hold(self) -> RequestResult:
         """Ask for the autopilot's own hold mode; blocks at most ``request_limit_s`` and a bit."""
         return self.set_mode(self.dialect.hold_mode)
+
+    def stop_at_once(self) -> bool:
+        """Send zero velocity and ask once for the autopilot's own hold mode; awaits no answer.
+
+        For a process that has to end: it needs no other thread of this link and not their lock.
+
+        Returns:
+            False when the vehicle obeys somebody else, or holds by itself: nothing was sent.
+
+        Raises:
+            VehicleError: The line broke.
+        """
+        heard, dialect = self._assembler, self._dialect
+        if heard is None or dialect is None or self.taken_over:
+            return False
+        if heard.mode != dialect.control_mode:
+            return False
+        limit_ns = int(self._parameters.request_limit_s * 1e9)
+        self._control.leave_to(dialect.hold_mode, time.monotonic_ns() + limit_ns)
+        self._send_setpoint(Setpoint(stamp_ns=0))
+        mode = (*dialect.mode_command(dialect.hold_mode), 0.0, 0.0, 0.0, 0.0)
+        command = mavlink.MAV_CMD_DO_SET_MODE
+        self._send(mavlink.MAVLink_command_long_message(*self._peer.target, command, 0, *mode))
+        return True
 
     def request_land(self) -> RequestResult:
         """Ask for the autopilot's own landing, only while it obeys us."""
@@ -314,7 +341,7 @@ class MavlinkLink:
         limit_s = self._parameters.connect_timeout_s
         with self._changed:
             self._changed.wait_for(
-                lambda: self._assembler is not None or self._error is not None, limit_s
+                lambda: self._assembler or self._error or self._thread.defect, limit_s
             )
             if self._assembler is not None:
                 return
@@ -338,10 +365,31 @@ class MavlinkLink:
                     self._take(message, source)
             if self._transport.openings != self._openings:
                 self._begin_anew()
+            self._watch_obedience(time.monotonic_ns())
             try:
                 self._keep_house(time.monotonic_ns())
             except VehicleError:
-                continue  # the transport knows, says why, and opens the line again
+                continue  # the transport reports the reason, and opens the line again
+
+    def _on_defect(self, error: BaseException) -> None:
+        self._report(error)
+        with self._changed:
+            self._changed.notify_all()
+
+    def _watch_obedience(self, now_ns: int) -> None:
+        """Compare what the vehicle reports with what it was told; the reading thread calls it."""
+        heard = self._assembler
+        if heard is None or now_ns < self._obedience_due_ns:
+            return
+        self._obedience_due_ns = now_ns + OBEDIENCE_NS
+        with self._changed:
+            told = heard.telemetry(now_ns)
+            if not told.in_control:
+                self._obedience.forget()
+            at = told.pose
+            position_m = None if at is None else (at.north_m, at.east_m, -at.altitude_agl_m)
+            reported_ns = heard.arrived_ns.get(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 0)
+            self._obedience.take(position_m, reported_ns, heard.reported_ns)
 
     def _begin_anew(self) -> None:
         self._openings = self._transport.openings
@@ -370,7 +418,7 @@ class MavlinkLink:
             self._changed.notify_all()
 
     def _meet(self, message: Any, source: Source, now_ns: int) -> bool:
-        """Choose the autopilot at its first HEARTBEAT; tell whether this was it."""
+        """Choose the autopilot at its first HEARTBEAT; return whether it was chosen."""
         if not self._peer.is_candidate(message, source, now_ns):
             return False
         try:

@@ -18,7 +18,7 @@ Vector = tuple[float, float, float]
 """North, east, down."""
 SPANS_S = (1.5, 3.5)
 """The way told and the way reported are compared over these times: fast descents soon, slow ones
-at last."""
+after longer."""
 LAG_S = 0.5
 """The vehicle is behind what it is told by about this much when it changes its height."""
 CALM_S = 1.0
@@ -33,9 +33,9 @@ SETTLED_S = 2.5
 POINTING = 0.7
 """Cosine of the angle up to which it points the same way."""
 LEAST_M = 1.0
-"""Shorter ways down prove nothing."""
+"""Shorter ways down are not conclusive."""
 LEAST_LATERAL_M = 1.0
-"""Nor do shorter ones sideways: gusts push."""
+"""Nor are shorter ones sideways: gusts move the vehicle."""
 LEAST_PART = 0.2
 """Of the way that it was told to go, the position has to show this part."""
 GAP_S = 0.5
@@ -66,7 +66,7 @@ class ObedienceWatch:
         self._velocity_m_s: Vector = (0.0, 0.0, 0.0)
 
     def forget(self) -> None:
-        """Believe whatever comes next."""
+        """Forget all reports and the doubt."""
         self.problem = ''
         self._marks.clear()
         self._told_m = self._velocity_m_s = (0.0, 0.0, 0.0)
@@ -93,7 +93,7 @@ class ObedienceWatch:
         if last is not None and at_s == last.at_s:
             return
         if last is not None and dist(position_m, last.seen_m) > STEP_M:
-            # A jump has its own watch, and its own answer.
+            # Jumps are handled by JumpWatch.
             self._marks.clear()
             return
         if last is not None:

@@ -27,7 +27,7 @@ class VehicleParameters:
     signing_key_file: str = parameter(
         '',
         'File with the key of MAVLink 2 signing: exactly 32 bytes, or a passphrase whose SHA-256 '
-        'is the key. Everything sent is signed, and what is not signed is not believed. Empty: '
+        'is the key. Everything sent is signed, and unsigned messages are rejected. Empty: '
         'no signing.',
     )
     connect_timeout_s: float = parameter(
@@ -61,7 +61,7 @@ class VehicleParameters:
     )
     jump_limit_m: float = parameter(
         5.0,
-        'A position that jumps farther than this from where its velocity leads is not believed '
+        'A position that jumps farther than this from where its velocity leads is rejected '
         'while we have control.',
         unit='m',
         low=1.0,

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which of the voices on the line is our autopilot; the others are heard and not believed."""
+"""Which system on the line is our autopilot; messages of all others are counted and ignored."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from peace_ros.core.vehicle.transport import Source
 
 NEW_ADDRESS_NS = 3_000_000_000
-"""Silence of the autopilot after which the same system is believed from another address."""
+"""Silence of the autopilot after which the same system is accepted from another address."""
 ANY_SYSTEM_NS = 2_000_000_000
 """How long system 1 is waited for before another system is taken, when none is asked for."""
 USUAL_SYSTEM = 1
 
 
 class Peer:
-    """The autopilot that is believed: system, component 1, and the address it speaks from.
+    """The autopilot that is accepted: system, component 1, and the address it sends from.
 
     Args:
         vehicle_id: System id; 0 takes system 1, or after two seconds the first other one.
@@ -54,7 +54,7 @@ class Peer:
         return True
 
     def choose(self, message: Any, source: Source, now_ns: int) -> None:
-        """Believe the sender of this HEARTBEAT from now on."""
+        """Accept the sender of this HEARTBEAT from now on."""
         self.target = (message.get_srcSystem(), message.get_srcComponent())
         self.source, self._heard_ns, self._known = source, now_ns, True
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What became of a request to the autopilot."""
+"""The result of a request to the autopilot."""
 
 from __future__ import annotations
 

@@ -45,12 +45,13 @@ def read_key(key_file: str) -> bytes:
     Raises:
         ConfigurationError: The file cannot be read or is empty.
     """
-    path = Path(key_file).expanduser()
     try:
+        path = Path(key_file).expanduser()
         content = path.read_bytes()
-    except OSError as error:
+    except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: unknown user after ~
+        reason = error.strerror if isinstance(error, OSError) else error
         raise ConfigurationError(
-            f'signing_key_file {path}: {error.strerror}; give 32 bytes or a passphrase'
+            f'signing_key_file {key_file}: {reason}; give 32 bytes or a passphrase'
         ) from error
     if len(content) == KEY_BYTES:
         return content
@@ -95,7 +96,7 @@ class Signer:
         return cls(read_key(key_file), path.with_name(f'{path.name}.{system_id}.time'))
 
     def sign(self, unsigned: bytes) -> bytes:
-        """Return a message whose header and checksum already say that it is signed, signed."""
+        """Sign a message whose header and checksum already announce a signature."""
         with self._lock:
             now = int((self._wall_s() - EPOCH_S) * 1e5)
             self._sent = max(self._sent + 1, self._received, now)
@@ -104,7 +105,7 @@ class Signer:
         return signed + hashlib.sha256(self._key + signed).digest()[:6]
 
     def accepts(self, message: bytes, system: int, component: int) -> bool:
-        """Tell whether a whole MAVLink message may be believed."""
+        """Return whether a whole MAVLink message has a valid signature."""
         signed = message[0] == MAVLINK_2 and bool(message[2] & SIGNED)
         with self._lock:
             if not signed:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import select
 import socket
 from typing import Any, Protocol
@@ -129,12 +130,7 @@ class _Serial:
     datagrams = False
 
     def __init__(self, device: str, baud: int) -> None:
-        try:
-            serial: Any = importlib.import_module('serial')
-        except ImportError as error:
-            raise VehicleError(
-                f'{device}: serial lines need pyserial; install python3-serial (apt) or pyserial'
-            ) from error
+        serial: Any = importlib.import_module('serial')
         try:
             self._line: Any = serial.Serial(device, baud, timeout=0, write_timeout=WRITE_S)
         except (OSError, ValueError) as error:
@@ -162,6 +158,29 @@ class _Serial:
         self._line.close()
 
 
+def parse_url(url: str) -> tuple[str, str, int]:
+    """Return scheme, host and port of a URL (see ``URL_HELP``), of a serial line device and baud.
+
+    Raises:
+        VehicleError: It is not understood, or needs a package that is not installed.
+    """
+    scheme, _, rest = url.partition(':')
+    if url.startswith('/dev/') or scheme == 'serial':
+        device, _, baud = (url if url.startswith('/dev/') else rest).partition(':')
+        if not device.startswith('/') or not (baud == '' or baud.isdecimal()):
+            raise VehicleError(f'connection {url!r} is not understood: {URL_HELP}')
+        if importlib.util.find_spec('serial') is None:
+            raise VehicleError(
+                f'{device}: serial lines need pyserial; install python3-serial (apt) or pyserial'
+            )
+        return 'serial', device, int(baud) if baud else DEFAULT_BAUD
+    host, _, port_text = rest.rpartition(':')
+    port = int(port_text) if port_text.isdecimal() else -1
+    if scheme not in {'udpin', 'udpout', 'tcp'} or not host or not 0 <= port <= 65535:
+        raise VehicleError(f'connection {url!r} is not understood: {URL_HELP}')
+    return scheme, host, port
+
+
 def open_transport(url: str, connect_s: float | None = None) -> Transport:
     """Open the line that a URL names.
 
@@ -172,16 +191,9 @@ def open_transport(url: str, connect_s: float | None = None) -> Transport:
     Raises:
         VehicleError: The URL is not understood, the port is taken, the device is missing.
     """
-    scheme, _, rest = url.partition(':')
-    if url.startswith('/dev/') or scheme == 'serial':
-        device, _, baud = (url if url.startswith('/dev/') else rest).partition(':')
-        if not device.startswith('/') or not (baud == '' or baud.isdigit()):
-            raise VehicleError(f'connection {url!r} is not understood: {URL_HELP}')
-        return _Serial(device, int(baud) if baud else DEFAULT_BAUD)
-    host, _, port_text = rest.rpartition(':')
-    port = int(port_text) if port_text.isdecimal() else -1
-    if scheme not in {'udpin', 'udpout', 'tcp'} or not host or not 0 <= port <= 65535:
-        raise VehicleError(f'connection {url!r} is not understood: {URL_HELP}')
+    scheme, host, port = parse_url(url)
+    if scheme == 'serial':
+        return _Serial(host, port)
     if scheme == 'tcp':
         return _Tcp(host, port, CONNECT_S if connect_s is None else connect_s)
     return _Udp(host, port, listen=scheme == 'udpin')

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Is a reported position to be believed? Jumps are not, until they have proved lasting; pure."""
+"""Accepts or rejects reported positions: a jump is rejected until it has persisted; pure."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ class PoseReport:
 class JumpWatch:
     """Compares each position with where the one before it led.
 
-    A jump is a reset of the position filter or a fault; whichever it is, the map no longer means
-    what it meant. While we have control the vehicle stands until the position comes back to where
-    it was, or has been steady at the old height for fifteen seconds: GNSS that returns moves the
-    position for good, and whoever lost his radio could help a vehicle that waits for ever least of
-    all. A height that jumped stays unbelieved, since everything that sinks relies on it. While
-    somebody else flies two steady seconds are enough.
+    A jump is a reset of the position filter or a fault; in both cases the map is no longer valid.
+    While we have control the vehicle stands until the position comes back to where it was, or has
+    been steady at the old height for fifteen seconds: GNSS that returns moves the position for
+    good, and without a radio nobody could help a vehicle that waits for ever. A height that jumped
+    stays rejected, since every descent relies on it. While somebody else flies two steady seconds
+    are enough.
 
     Args:
         limit_m: Deviation that is still believed.
@@ -53,7 +53,7 @@ class JumpWatch:
         """Why the position is not believed, empty when it is."""
 
     def forget(self) -> None:
-        """Believe whatever comes next."""
+        """Accept the next report, whatever it is."""
         self._believed = self._newest = None
         self._height_jumped_m = 0.0
         self.problem = ''
@@ -77,7 +77,7 @@ class JumpWatch:
             return self._believe(report)
         jump_m = dist(report.position_m, self._believed.position_m)
         self.problem = (
-            f'the reported position jumped by {jump_m:.1f} m, which no flight explains (limit '
+            f'the reported position jumped by {jump_m:.1f} m, more than it can have flown (limit '
             f'{self._limit_m:g} m): holding until it comes back, or has been steady at the same '
             f'height for {RESET_S:g} s'
         )

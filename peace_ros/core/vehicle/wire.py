@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Between bytes and messages: parsing that survives rubbish, packing, signatures."""
+"""Between bytes and messages: parsing that survives invalid bytes, packing, signatures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from peace_ros.core.vehicle.signing import SIGNED, Signer
 
 RADIO_STATUS = 109
-"""Made by the radio in between, which has no key; it tells nothing about the vehicle."""
+"""Sent by the radio in between, which has no key; it contains nothing about the vehicle."""
 CHECKSUM_BYTES = 2
 
 
@@ -42,8 +42,8 @@ class Wire:
         self._stream_parser = _new_parser()
 
     def decode(self, data: bytes) -> list[Any]:
-        """Return the messages that may be believed to be what their signature says."""
-        # Datagrams stand alone: rubbish in one must not swallow the beginning of the next.
+        """Return the messages; with signing, only those with a valid signature."""
+        # Datagrams are independent: invalid bytes in one must not hide the start of the next.
         parser = _new_parser() if self._datagrams else self._stream_parser
         try:
             messages = parser.parse_buffer(bytearray(data)) or []

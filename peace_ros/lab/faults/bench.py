@@ -277,6 +277,7 @@ class FlightBench:
             parameters, remaps = {'threads': 1}, {PROMPT: RAW + PROMPT}
         elif name == 'landing':
             parameters = {'mavlink': f'udpout:127.0.0.1:{self.line.port}'}
+            parameters['vehicle.after_handover'] = self.setting.after_handover
             parameters.update(self._key('vehicle.'))
         reads_preset = name in {'segmentation', 'prompt_generator', 'landing'}
         return ros_arguments(

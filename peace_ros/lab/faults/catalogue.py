@@ -30,6 +30,7 @@ REPRESENTATIVE = (
     'pilot_takes_over_landing',
     'altitude_nan',
     'executor_stalls',
+    'thread_setpoint_sender',
 )
 """What continuous integration runs: one of each kind."""
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.landing import State
+from peace_ros.nodes.status import FAILED
 
 if TYPE_CHECKING:
     from peace_ros.lab.faults.bench import FlightBench
@@ -75,6 +76,8 @@ class Expected:
     """After the fault nothing but this state is seen until the end."""
     ends_processes: tuple[str, ...] = ()
     """Processes that end by themselves because of the fault, with a sentence in their log."""
+    ends_within_s: float | None = None
+    """They end within this time, with a status that is not 0."""
     refuses: bool = False
     """The engagement is refused with a sentence."""
     over_person_s: float | None = None
@@ -83,7 +86,7 @@ class Expected:
     """The vehicle is held in the air; False where the autopilot itself lets go."""
 
     def __post_init__(self) -> None:
-        known = {state.value for state in State} | {ABSENT}
+        known = {state.value for state in State} | {ABSENT, FAILED}
         for name in (*self.reaches, *self.allowed, *self.recovers, self.stays):
             if name not in known:
                 raise ConfigurationError(f'state {name!r} of a fault: choose one of {known}')
@@ -104,6 +107,8 @@ class FlightSetting:
     """All nodes take their time from ``/clock``."""
     signed: bool = False
     """Companion and autopilot share a key of MAVLink 2 signing."""
+    after_handover: str = 'hold'
+    """Parameter of the landing node."""
     at_origin: bool = False
     """The flight begins at the origin of the local frame, where a mirrored position is the same."""
 

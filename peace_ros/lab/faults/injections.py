@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from peace_ros.lab.faults.bench import FlightBench
     from peace_ros.lab.faults.fault import Injection
 
+_HEARD_S = 0.1
+"""What is published must have been heard before the next message on another topic."""
+
 
 @dataclass(frozen=True)
 class Topic:
@@ -130,6 +133,33 @@ class Stalled:
     def end(self, bench: FlightBench) -> None:
         """It ends by itself."""
         bench.silence_ends()
+
+
+@dataclass(frozen=True)
+class Defect:
+    """A thread of the landing node raises an exception; the node ends, and is started again."""
+
+    thread: str
+    """See :mod:`peace_ros.lab.faults.landing`."""
+    engages: bool = False
+    """A person engages, by which the thread begins."""
+    stalls_s: float = 0.0
+    """The executor is busy for so long, by which the dead-man's thread begins."""
+
+    def begin(self, bench: FlightBench) -> None:
+        """Break the thread."""
+        bench.silence_begins()
+        bench.node.break_landing(self.thread)
+        if self.engages or self.stalls_s:
+            time.sleep(_HEARD_S)
+        if self.engages:
+            bench.node.engage_without_waiting()
+        if self.stalls_s:
+            bench.node.stall_landing(self.stalls_s)
+
+    def end(self, bench: FlightBench) -> None:
+        """Start the node again."""
+        bench.restore('landing')
 
 
 @dataclass(frozen=True)
@@ -395,6 +425,7 @@ _KINDS: dict[str, Callable[..., Injection]] = {
     'kill': Killed,
     'suspend': Suspended,
     'stall': Stalled,
+    'defect': Defect,
     'model': BadModel,
     'bundle': BadBundle,
     'clock_step': ClockStep,

@@ -99,10 +99,11 @@ def judge(fault: Fault, record: Record) -> Row:
 
 
 def wire_figures(record: Record) -> dict[str, float]:
-    """Return when the last set-point, and the last one that was not zero, left the companion.
+    """Return when the last set-point and the last one that was not zero left the companion.
 
-    Only what was sent before the fault ended counts; a key is missing where nothing was. With a
-    person below, for how long the vehicle descended over them.
+    Of set-points only what was sent before the fault ended counts; a key is missing where nothing
+    was. Also when the first process ended by itself, and with a person below, for how long the
+    vehicle descended over them.
     """
     during = [s for s in record.sent if s.at_s <= record.fault_end_s]
     moving = [s for s in during if not s.is_zero]
@@ -110,6 +111,9 @@ def wire_figures(record: Record) -> dict[str, float]:
     for key, found in (('last_setpoint_s', during), ('last_motion_s', moving)):
         if found:
             figures[key] = round(found[-1].at_s, 3)
+    ended = [each.at_s for each in record.ended if not each.meant]
+    if ended:
+        figures['ended_s'] = round(ended[0], 3)
     if record.over_person_s is not None:
         figures['over_person_s'] = round(record.over_person_s, 2)
     return figures
@@ -129,6 +133,8 @@ def describe(fault: Fault) -> str:
         parts.append(f'no descent after {e.still_within_s:g} s')
     if e.zero_within_s is not None:
         parts.append(f'zero on the wire within {e.zero_within_s:g} s')
+    if e.ends_within_s is not None:
+        parts.append(f'{" and ".join(e.ends_processes)} ends within {e.ends_within_s:g} s')
     if e.silent_within_s is not None:
         parts.append(f'no set-point after {e.silent_within_s:g} s')
     if e.over_person_s is not None:
@@ -278,6 +284,12 @@ def _ends(expected: Expected, record: Record) -> Iterator[str]:
             yield f'{name} did not end'
         elif not own[name].last_words:
             yield f'{name} ended without a word'
+        elif expected.ends_within_s is not None and not own[name].status:
+            yield f'{name} ended with status 0'
+        elif expected.ends_within_s is not None and own[name].at_s > expected.ends_within_s:
+            yield (
+                f'{name} ended after {own[name].at_s:.2f} s, {expected.ends_within_s:g} s allowed'
+            )
 
 
 def _handovers(_expected: Expected, record: Record) -> Iterator[str]:

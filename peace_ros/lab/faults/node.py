@@ -17,6 +17,7 @@ from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_msgs.msg import Float64, String
+from std_srvs.srv import Trigger
 
 from peace_ros.core.domain import Pose
 from peace_ros.core.messages import diagnostic_values, ns_from_time, pose_from_message
@@ -84,6 +85,7 @@ class BenchNode(Listener):
         self.node.create_subscription(DiagnosticArray, 'landing/status', self._on_status, _EVIDENCE)
         self.node.create_subscription(PoseStamped, 'ground_truth/pose', self._on_pose, _EVIDENCE)
         self._stall = self.node.create_publisher(Float64, 'fault/stall', qos.RESULT)
+        self._defect = self.node.create_publisher(String, 'fault/defect', qos.RESULT)
         self._model = self.node.create_publisher(String, 'fault/model', qos.RESULT)
         self.node.create_timer(_RELEASE_S, self._release)
         self.start()
@@ -145,6 +147,14 @@ class BenchNode(Listener):
     def stall_landing(self, seconds: float) -> None:
         """Let a callback of the landing node take so long."""
         self._stall.publish(Float64(data=seconds))
+
+    def break_landing(self, thread: str) -> None:
+        """Let a thread of the landing node raise an exception."""
+        self._defect.publish(String(data=thread))
+
+    def engage_without_waiting(self) -> None:
+        """Call the landing node's service; nobody waits for the answer."""
+        self._engage.call_async(Trigger.Request())
 
     def fail_model(self, fault: str) -> None:
         """Tell the segmentation node how its model has to fail; empty: not at all."""

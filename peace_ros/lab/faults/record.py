@@ -161,6 +161,6 @@ def longest_gap_s(times_s: Iterable[float], begin_s: float, end_s: float) -> flo
 
 STILL = frozenset(
     state.value for state in (State.IDLE, State.WAITING, State.HANDOVER, State.HOLD, State.ABORTED)
-)
+) | {'FAILED'}
 """States in which the set-point has to be zero. They are listed here a second time on purpose: the
 judge does not rely on what the landing says of itself."""

@@ -21,6 +21,7 @@ _TITLES = {
     'autopilot': 'Autopilot, pilot, weather',
     'process': 'Processes',
     'clock': 'Clocks',
+    'thread': 'Threads of the landing node',
 }
 
 
@@ -51,6 +52,7 @@ flies; a test keeps them equal. {len(FAULTS)} faults.
     peace faults                                  # all of them, with a report
     peace faults --list                           # what there is
     peace faults --only camera --only gnss_lost   # a group, a fault
+    peace faults --only thread --repeat 20        # each of them so often
     peace faults --jobs 2 --json faults.json      # two flights at a time, the report as JSON
     peace faults --soak 60                        # one hour of flying, landing, flying again
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.domain.parameters import check, parameter
 from peace_ros.core.node_parameters import CameraOptions, Group
+from peace_ros.core.vehicle import AUTO, check_access
 from peace_ros.simulation.autopilot import AutopilotParameters
 
 
@@ -72,6 +73,8 @@ class SatelliteViewOptions:
             raise ConfigurationError(
                 'parameter pose_source = mavlink without pose_mavlink: say where the autopilot is'
             )
+        if self.pose_mavlink:
+            check_access(self.pose_mavlink, AUTO, self.pose_signing_key_file)
         if not self.world and self.labels:
             raise ConfigurationError(
                 f'parameter labels = {self.labels!r} without world: give the orthophoto too'

@@ -15,7 +15,7 @@ from rclpy.clock import Clock, ClockType
 
 from peace_ros.core.domain import Pose, VehicleError
 from peace_ros.core.messages import pose_from_message
-from peace_ros.core.vehicle import MavlinkLink, VehicleParameters, open_vehicle
+from peace_ros.core.vehicle import VehicleLink, VehicleParameters, open_vehicle
 from peace_ros.nodes.connection import Connection
 from peace_ros.nodes.messages import BODY_FRAME, pose_to_message, transform_from_pose
 from peace_ros.nodes.qos import COMMAND, POSE, POSE_IN
@@ -58,10 +58,12 @@ class MavlinkSource:
             system_id=_CAMERA_SYSTEM_ID, signing_key_file=signing_key_file
         )
 
-        def open_link() -> MavlinkLink:
-            return open_vehicle(url, 'auto', node.clock_ns, parameters, _TRY_S)
+        def open_link() -> VehicleLink:
+            return open_vehicle(url, 'auto', node.clock_ns, parameters, _TRY_S, on_defect=node.fail)
 
-        self._connection = Connection(open_link, lambda sentence: node.say('vehicle', sentence))
+        self._connection = Connection(
+            open_link, lambda sentence: node.say('vehicle', sentence), node.fail
+        )
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(_POLL_S, self._poll, clock=self._steady)
 

@@ -240,3 +240,58 @@ def test_a_stop_leaves_at_once_and_zeros_after_it_keep_the_rate():
     sender.stop()
     assert stopped
     assert len(link.sent) <= count + 1
+
+
+def test_a_thread_that_died_is_not_called_sending(eventually):
+    died = []
+    link = RecordingLink()
+    sender = SetpointSender(link, on_defect=died.append)
+    sender.start()
+    sender.submit(FORWARD)
+    assert eventually(lambda: sender.statistics().state is SenderState.SENDING)
+    link.telemetry = lambda: 1 / 0
+    assert eventually(lambda: died != [])
+    assert isinstance(died[0], ZeroDivisionError)
+    assert eventually(lambda: sender.is_stuck)
+    assert sender.statistics().state is SenderState.STUCK
+
+
+def test_a_thread_that_stands_still_is_found_without_waiting_for_it(eventually):
+    link, gate = RecordingLink(), threading.Event()
+    sender = SetpointSender(link)
+    sender.start()
+    link.send_velocity = lambda _setpoint: gate.wait(20.0)
+    sender.submit(FORWARD)
+    assert eventually(lambda: sender.is_stuck)
+    begun = time.monotonic()
+    sender.submit(FORWARD)
+    assert sender.statistics().state is SenderState.STUCK
+    sender.watch()
+    sender.watch()
+    with pytest.raises(RuntimeError, match='does not run'):
+        sender.watch()
+    sender.halt()
+    assert time.monotonic() - begun < 0.5, 'nobody waits for the thread'
+    assert sender.statistics().state is SenderState.STOPPED
+    gate.set()
+
+
+def test_one_late_look_of_a_process_that_was_stopped_as_a_whole_is_no_failure(bench):
+    bench.sender.start()
+    for _ in range(10):
+        bench.now_ns += 10**10  # the clock ran on while nobody ran
+        bench.sender.watch()
+        before = bench.sender._ticked_ns
+        deadline = time.monotonic() + 5.0
+        while bench.sender._ticked_ns == before and time.monotonic() < deadline:
+            time.sleep(0.005)
+        bench.sender.watch()
+    bench.sender.stop()
+
+
+def test_halting_leaves_nothing_to_send(bench):
+    bench.sender.submit(FORWARD)
+    bench.sender.halt()
+    bench.run(5.0)
+    assert bench.link.sent == []
+    assert bench.link.holds == 0

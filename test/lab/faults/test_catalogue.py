@@ -50,6 +50,10 @@ ASKED_FOR = {
         'landing_killed_handover landing_killed_hold segmentation_killed camera_killed'
     ),
     'executor stalled': 'executor_stalls landing_stands_still',
+    'a defect in each thread of the landing node': (
+        'thread_timer thread_callback thread_setpoint_sender thread_mavlink_link thread_engage '
+        'thread_hand_over thread_after_handover thread_stuck'
+    ),
     'disk full while recording': 'disk_full',
     'wind 10 m/s': 'wind_10_m_s',
     'a person walks under at 30 m': 'person_seen_at_30_m person_painted_at_30_m',
