@@ -8,9 +8,9 @@
 #   launch_scripts/mutants.sh GROUP [MUTANT...]   segmentation, mapping, landing or vehicle
 #   launch_scripts/mutants.sh table               figures and survivors of the groups that have run
 #
-# Works on a copy of the tracked files in build/mutants/GROUP; what ran there stands until the
-# function or its tests change. Needs the environment of launch_scripts/test.sh and the extra
-# "mutation".
+# Works on a copy of the tracked files in build/mutants/GROUP. What was killed there stands until
+# its function changes; what survived runs again when a test has changed. Needs the environment of
+# launch_scripts/test.sh and the extra "mutation".
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -45,22 +45,33 @@ esac
 shift
 
 python - "$group" "${mutate[*]}" "${tests[*]}" <<'PYTHON'
-import json, shutil, subprocess, sys
+import json
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 group, mutate, tests = sys.argv[1], sys.argv[2].split(), sys.argv[3].split()
 copy = Path('build/mutants', group)
+tests_changed = False
 listed = ['git', 'ls-files', '-z', '--cached', '--others', '--exclude-standard']
 for name in subprocess.run(listed, capture_output=True, text=True, check=True).stdout.split('\0'):
     source, target = Path(name), copy / name
-    # Files that have not changed keep their time, so that mutmut keeps their results.
-    if source.is_file() and not (
+    if not source.is_file() or (
         target.is_file() and target.read_bytes() == source.read_bytes()
     ):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, target)
-        if name.startswith('test/'):
-            (copy / 'mutants' / name).unlink(missing_ok=True)
+        continue  # a file that keeps its time keeps its results
+    target.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(source, target)
+    tests_changed |= name.startswith('test/')
+for path in (copy / 'mutants').rglob('*.py.meta') if tests_changed else ():
+    # What survived is run again; mutmut would let it stand.
+    results = json.loads(path.read_text(encoding='utf-8'))
+    codes = results['exit_code_by_key']
+    results['exit_code_by_key'] = {
+        name: None if code in (0, 33) else code for name, code in codes.items()
+    }
+    path.write_text(json.dumps(results), encoding='utf-8')
 settings = {
     'source_paths': ['peace_ros'],
     'only_mutate': [f'peace_ros/{each}' for each in mutate],
