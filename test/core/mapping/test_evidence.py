@@ -16,7 +16,7 @@ from peace_ros.core.domain import Camera, Heatmap, Pose
 from peace_ros.core.mapping import MapParameters, SafetyMap
 
 S = 1_000_000_000
-CAMERA = Camera.from_degrees(352, 352, 73.0)
+CAMERA = Camera.from_degrees(32, 32, 73.0)
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 Look = tuple[float, float, float]
 """Time in s, value of the heatmap, altitude in m."""
@@ -78,7 +78,7 @@ def expected(looks: Sequence[Look], p: MapParameters, *, later_s: float = 0.0) -
 def mapped(looks: Sequence[Look], p: MapParameters, *, later_s: float = 0.0) -> float:
     safety_map = SafetyMap(p)
     for time_s, value, altitude_m in looks:
-        heatmap = Heatmap(np.full((352, 352), value, np.float32), round(time_s * S))
+        heatmap = Heatmap(np.full((32, 32), value, np.float32), round(time_s * S))
         pose = Pose(0, 0.0, 0.0, -altitude_m, LEVEL, altitude_m)
         safety_map.add(heatmap, CAMERA, pose)
     layers = safety_map.layers((safety_map.stamp_ns or 0) + round(later_s * S))
@@ -151,7 +151,7 @@ def test_looks_are_counted_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> Non
     safety_map = SafetyMap(DEFAULTS)
     pose = Pose(0, 0.0, 0.0, -30.0, LEVEL, 30.0)
     for number in range(5):
-        heatmap = Heatmap(np.full((352, 352), 0.8, np.float32), number * S)
+        heatmap = Heatmap(np.full((32, 32), 0.8, np.float32), number * S)
         safety_map.add(heatmap, CAMERA, pose)
         layers = safety_map.layers(number * S)
         assert layers.looks[layers.cell_at(0.0, 0.0)] == min(number + 1, 3)
@@ -164,7 +164,7 @@ def test_each_change_has_its_revision() -> None:
     safety_map.widen_unsafe(1.0)
     assert safety_map.revision == 0, 'nothing is known that could grow'
     pose = Pose(0, 0.0, 0.0, -30.0, LEVEL, 30.0)
-    safety_map.add(Heatmap(np.full((352, 352), 0.8, np.float32), 5 * S), CAMERA, pose)
+    safety_map.add(Heatmap(np.full((32, 32), 0.8, np.float32), 5 * S), CAMERA, pose)
     assert safety_map.revision == 1
     assert safety_map.stamp_ns == 5 * S
     safety_map.widen_unsafe(1.0)

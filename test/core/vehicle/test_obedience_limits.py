@@ -1,0 +1,233 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""When exactly a position is no longer believed, with reports every sixteenth of a second."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos, radians, sin
+
+import pytest
+
+from peace_ros.core.vehicle.obedience import ObedienceWatch, Vector
+
+STEP_S = 0.0625
+Told = Callable[[float], Vector]
+Reported = Callable[[float], Vector | None]
+
+
+def frozen(_at_s: float) -> Vector:
+    return (4.0, -3.0, -50.0)
+
+
+def steady(north: float = 0.0, east: float = 0.0, down: float = 0.0) -> Told:
+    return lambda _at_s: (north, east, down)
+
+
+def moving(north: float = 0.0, east: float = 0.0, down: float = 0.0) -> Reported:
+    return lambda at_s: (north * at_s, east * at_s, down * at_s)
+
+
+def noticed(
+    told: Told,
+    reported: Reported = frozen,
+    until_s: float = 14.0,
+    *,
+    watch: ObedienceWatch | None = None,
+    boot: Callable[[float], float] | None = None,
+    silent: Callable[[float], bool] = lambda _at_s: False,
+) -> tuple[float, str] | None:
+    """Return when the position was first doubted, and why."""
+    watch = watch or ObedienceWatch()
+    for step in range(round(until_s / STEP_S) + 1):
+        at_s = step * STEP_S
+        if silent(at_s):
+            continue
+        boot_ns = None if boot is None else round(boot(at_s) * 1e9)
+        watch.take(reported(at_s), round(at_s * 1e9), boot_ns)
+        watch.tell(told(at_s))
+        if watch.problem:
+            return at_s, watch.problem
+    return None
+
+
+@pytest.mark.parametrize(
+    ('speed', 'at_s', 'way'),
+    [
+        (2.0, 2.0, 'sink 3.0 m in 1.5 s and reports 0.0 m'),
+        (0.75, 2.0, 'sink 1.1 m in 1.5 s and reports 0.0 m'),
+        (0.5, 4.0, 'sink 1.8 m in 3.5 s and reports 0.0 m'),
+        (0.3125, 4.0, 'sink 1.1 m in 3.5 s and reports 0.0 m'),
+    ],
+)
+def test_an_altitude_that_stands_still_is_noticed(speed: float, at_s: float, way: str) -> None:
+    found = noticed(steady(down=speed))
+    assert found is not None
+    assert found[0] == at_s
+    assert f'told to {way}: its altitude' in found[1]
+
+
+@pytest.mark.parametrize('speed', [0.25, 0.0, -0.5])
+def test_a_way_down_of_less_than_a_metre_proves_nothing(speed: float) -> None:
+    assert noticed(steady(down=speed)) is None
+
+
+@pytest.mark.parametrize(('share', 'believed'), [(0.21, True), (0.19, False), (-1.0, False)])
+def test_a_fifth_of_the_way_must_show(share: float, believed: bool) -> None:
+    found = noticed(steady(down=2.0), moving(down=2.0 * share))
+    assert (found is None) == believed
+    if found:
+        assert f'reports {3.0 * share:.1f} m' in found[1]
+    found = noticed(steady(east=2.0), moving(east=2.0 * share))
+    assert (found is None) == believed
+
+
+def test_what_is_told_counts_half_a_second_later_and_until_then() -> None:
+    begun = noticed(lambda at_s: (0.0, 0.0, 2.0 if at_s >= 5.0 else 0.0))
+    assert begun is not None
+    assert begun[0] == 6.0625
+    assert 'sink 1.1 m in 1.5 s' in begun[1]
+    ended = noticed(
+        lambda at_s: (0.0, 0.0, 2.0 if at_s < 5.0 else 0.0),
+        lambda at_s: (0.0, 0.0, 2.0 * min(at_s, 4.0)),
+    )
+    assert ended is not None
+    # At t, 5.5 - t of the 6.5 - t seconds that were told are shown: a fifth at 5.25 s.
+    assert ended[0] == 5.3125
+
+
+def test_a_vehicle_that_climbed_has_a_second_more() -> None:
+    found = noticed(
+        lambda at_s: (0.0, 0.0, -2.0 if at_s < 5.0 else 2.0),
+        lambda at_s: (0.0, 0.0, -2.0 * min(at_s, 5.0)),
+    )
+    assert found is not None
+    assert found[0] == 8.0
+
+
+@pytest.mark.parametrize(
+    ('rate', 'way'), [(0.5, 'sink 1.5 m in 1.5 s'), (1.0, 'sink 3.0 m'), (3.0, 'sink 3.0 m')]
+)
+def test_time_passes_as_slowly_as_the_slower_clock_says(rate: float, way: str) -> None:
+    found = noticed(steady(down=2.0), boot=lambda at_s: rate * at_s)
+    assert found is not None
+    assert found[0] == 2.0
+    assert way in found[1]
+    assert noticed(steady(down=2.0), boot=lambda at_s: 100.0 - at_s) is None
+
+
+@pytest.mark.parametrize(
+    ('gap', 'at_s'), [((1.0, 1.5), 2.0), ((1.0, 1.5625), 1.5625 + 0.0625 + 2.0)]
+)
+def test_a_gap_of_more_than_half_a_second_begins_anew(
+    gap: tuple[float, float], at_s: float
+) -> None:
+    found = noticed(steady(down=2.0), silent=lambda now_s: gap[0] < now_s < gap[1])
+    assert found is not None
+    assert found[0] == at_s
+
+
+def test_an_unknown_position_begins_anew() -> None:
+    found = noticed(steady(down=2.0), lambda at_s: None if at_s == 1.0 else frozen(at_s))
+    assert found is not None
+    assert found[0] == 1.0625 + 2.0
+
+
+def test_a_clock_that_goes_back_begins_anew() -> None:
+    watch = ObedienceWatch()
+    assert noticed(steady(down=2.0), until_s=1.5, watch=watch) is None
+    found = noticed(steady(down=2.0), watch=watch)
+    assert found is not None
+    assert found[0] == 0.0625 + 2.0
+
+
+def test_the_same_report_again_is_looked_at_once() -> None:
+    watch = ObedienceWatch()
+    assert noticed(steady(down=2.0), until_s=1.9375, watch=watch) is None
+    count = len(watch._marks)
+    for _ in range(5):
+        watch.take(frozen(0.0), round(1.9375e9))
+    assert len(watch._marks) == count
+
+
+@pytest.mark.parametrize(('jump_m', 'at_s'), [(3.0, 2.0), (3.0625, 1.0625 + 2.0)])
+def test_a_jump_begins_anew(jump_m: float, at_s: float) -> None:
+    def reported(now_s: float) -> Vector:
+        return (4.0 + (jump_m if now_s >= 1.0 else 0.0), -3.0, -50.0)
+
+    found = noticed(steady(down=2.0), reported)
+    assert found is not None
+    assert found[0] == at_s
+
+
+@pytest.mark.parametrize('turned', [0.0, 90.0, 200.0])
+@pytest.mark.parametrize(
+    ('speed', 'way'), [(1.0, '2.0 m'), (0.5625, '1.1 m'), (0.4375, None), (0.0, None)]
+)
+def test_a_position_that_stands_still_is_noticed(
+    speed: float, way: str | None, turned: float
+) -> None:
+    north, east = speed * cos(radians(turned)), speed * sin(radians(turned))
+    found = noticed(steady(north, east))
+    assert (found is None) == (way is None)
+    if found:
+        assert found[0] == 4.5
+        assert f'told to go {way} sideways in 2 s and reports' in found[1]
+        assert 'its position is not believed' in found[1]
+
+
+@pytest.mark.parametrize(('turned', 'believed'), [(70.0, True), (83.0, False), (-83.0, False)])
+def test_only_the_way_that_was_told_counts(turned: float, believed: bool) -> None:
+    told = steady(north=cos(radians(30.0)), east=sin(radians(30.0)))
+    went = moving(north=cos(radians(30.0 + turned)), east=sin(radians(30.0 + turned)))
+    assert (noticed(told, went) is None) == believed
+
+
+def test_a_way_must_have_pointed_there_for_two_and_a_half_seconds_before() -> None:
+    turned = noticed(lambda at_s: (1.0, 0.0, 0.0) if at_s < 4.0 else (-0.5, 0.86, 0.0))
+    assert turned is not None
+    assert turned[0] == 8.5
+    begun = noticed(lambda at_s: (0.0, 1.0 if at_s >= 5.0 else 0.0, 0.0))
+    assert begun is not None
+    assert begun[0] == 9.5
+
+
+@pytest.mark.parametrize(('aside_deg', 'pointed'), [(40.0, True), (50.0, False)])
+def test_ways_that_point_up_to_45_deg_aside_point_there(aside_deg: float, pointed: bool) -> None:
+    def told(at_s: float) -> Vector:
+        turned = radians(aside_deg if round(at_s / STEP_S) % 2 else -aside_deg)
+        return (2.0 * cos(turned), 2.0 * sin(turned), 0.0)
+
+    found = noticed(told)
+    assert (found is not None) == pointed
+
+
+def test_what_is_told_sideways_counts_a_second_later_and_until_then() -> None:
+    """The way that is shown ends a second after the way that was told."""
+    late = noticed(
+        lambda at_s: (2.0 if at_s >= 6.0 else 0.25, 0.0, 0.0),
+        lambda at_s: (0.25 * at_s, 0.0, 0.0),
+    )
+    assert late is not None
+    # With the lag 0.25 * (2 - t) + 2 t m were told, of which 0.5 m is a fifth from 2.5 m on.
+    assert late[0] == 6.0 + 1.0 + 1.1875
+
+
+def test_marks_are_kept_as_long_as_they_are_compared() -> None:
+    watch = ObedienceWatch()
+    noticed(steady(), until_s=14.0, watch=watch)
+    assert len(watch._marks) == round(5.5 / STEP_S) + 1
+
+
+def test_what_was_doubted_or_told_is_forgotten_when_asked() -> None:
+    watch = ObedienceWatch()
+    assert noticed(steady(down=2.0), watch=watch) is not None
+    watch.forget()
+    assert watch.problem == ''
+    for step in range(100):
+        watch.take(frozen(0.0), round((20.0 + step * STEP_S) * 1e9))
+    assert watch.problem == '', 'nothing was told since'
+    watch.tell((0.0, 0.0, 2.0))
+    for step in range(100, 140):
+        watch.take(frozen(0.0), round((20.0 + step * STEP_S) * 1e9))
+    assert watch.problem
