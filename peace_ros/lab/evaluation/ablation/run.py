@@ -56,7 +56,7 @@ class _Bench:
             )
         threads = cores.segmentation.threads
         self.segmenter = FeatureSegmenter(
-            cores.bundle, cores.segmenter.terms, threads, cores.own.clipseg_max_looks
+            cores.bundle, cores.segmenter.terms, cores.segmentation, cores.own
         )
         encoder = SharedEncoder(ClipEncoder(Bundle.load(cores.prompting.bundle), threads=threads))
         opposite = OppositeEncoder(encoder)
@@ -77,14 +77,13 @@ class _Bench:
 
     def look(self, frame: Frame, labels: NDArray[np.uint8]) -> Iterator[tuple[Key, Counts]]:
         """Yield the counts of every variant and fusion on one image."""
-        features = self.segmenter.encode(frame)
         by_template: dict[str, dict[str, Counts]] = {}
         for variant, generator in self._generators:
             generator.reset()
             prompt = generator.generate(frame)
             # Variants often come to the same prompt; it is decoded once.
             if prompt.template not in by_template:
-                scores = self.segmenter.scores(features, prompt, tuple(FUSIONS))
+                scores = self.segmenter.scores(frame, prompt)
                 by_template[prompt.template] = {
                     name: count_labels(
                         labels, fitted(calibrated(each, self._standing[name]), labels.shape)
@@ -132,4 +131,4 @@ def ablate(
         for key, each in sums.items():
             counts[key].append(each)
     stacked = {key: np.stack(each) for key, each in counts.items()}
-    return Counted(stacked, tuple(names), tuple(skipped), bench.segmenter.encodings)
+    return Counted(stacked, tuple(names), tuple(skipped), bench.segmenter.calls['image_encoder'])
