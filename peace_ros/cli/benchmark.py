@@ -79,7 +79,7 @@ def benchmark(
         ),
     ] = False,
 ) -> None:
-    """Time CLIPSeg and FastSAM frame by frame, beside the ways that others run them."""
+    """Time CLIPSeg and FastSAM frame by frame, compared with the ways that others run them."""
     provider = provider or _fastest()
     check_providers((provider,))
     if reference or fastsam or not (clipseg and clip):  # the reference, or random bundles

@@ -19,7 +19,7 @@ from peace_ros.lab.markdown import markdown_table
 Figures = dict[str, Any]
 
 
-NO_BLABBERSEG = 'BlabberSeg is a scheme for CLIPSeg; there is none of FastSAM to compare with'
+NO_BLABBERSEG = 'BlabberSeg is a scheme for CLIPSeg; it has no counterpart for FastSAM'
 
 
 def clipseg_figures(

@@ -73,7 +73,7 @@ class SharedEncoder:
 
 
 class OppositeEncoder:
-    """Turns images about, so that the words that fit least come first."""
+    """Negates image embeddings, so that the words that fit least come first."""
 
     def __init__(self, encoder: Encoder) -> None:
         self._encoder = encoder

@@ -35,7 +35,7 @@ Counts = NDArray[np.uint32]
 
 @dataclass(frozen=True)
 class Counted:
-    """What every variant did on every frame."""
+    """The counts of every variant on every frame."""
 
     counts: dict[Key, NDArray[np.uint32]]
     """[frames, LABELS, BINS]; with the set difference the bundle's threshold stands at one half."""
@@ -111,7 +111,7 @@ def ablate(
         variants: ways to write prompts.
         tile_px: see :func:`tiles_of`; None also takes what the source suggests.
         strict: see :func:`readable`.
-        watch: shows how far it is.
+        watch: yields the samples, and may show the progress.
 
     Raises:
         DatasetError: see :func:`readable`.

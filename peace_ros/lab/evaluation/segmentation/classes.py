@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Class tables: what the values or colours of a label raster mean to a vehicle that lands."""
+"""Class tables: which label each value or colour of a label raster stands for."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class ClassTable:
                     'images need: add its index or colour'
                 )
             if key in keys:
-                raise DatasetError(f'{self.where}: class {each.name}: its value is there twice')
+                raise DatasetError(f'{self.where}: class {each.name}: its value is used twice')
             keys[key] = each.counted_as(mixed)
         return Converter(masks, keys)
 

@@ -43,7 +43,7 @@ def dataset_source(name: str, root: Path, split: str, mixed: str) -> SampleSourc
     content = read_yaml(path)
     table = parse_classes(content, str(path))
     if not root.is_dir():
-        raise DatasetError(f'--root {root} is no folder: give the one that holds {name}')
+        raise DatasetError(f'--root {root} is not a folder: give the one that holds {name}')
     layout, images = _find(content, root, path)
     chosen = _of_split(images, content, root, split, path)
     labels = {image: _label_of(image, layout) for image in chosen}

@@ -51,7 +51,7 @@ class Sample(Protocol):
 
     @property
     def name(self) -> str:
-        """What people call it."""
+        """Name that is shown."""
         ...
 
     def load(self) -> Pair:
@@ -174,7 +174,7 @@ def folder_source(images: Path, labels: Path, classes: str, mixed: str) -> Sampl
     """
     for option, folder in (('--images', images), ('--labels', labels)):
         if not folder.is_dir():
-            raise DatasetError(f'{option} {folder} is no folder: give one')
+            raise DatasetError(f'{option} {folder} is not a folder: give one')
     found = _images(images.rglob('*'))
     if not found:
         raise DatasetError(f'{images} holds no image ({", ".join(IMAGE_SUFFIXES)})')
