@@ -79,7 +79,7 @@ def benchmark(
         ),
     ] = False,
 ) -> None:
-    """Time CLIPSeg and FastSAM frame by frame, beside the ways that others run them."""
+    """Time CLIPSeg and FastSAM frame by frame, compared with the ways that others run them."""
     provider = provider or _fastest()
     check_providers((provider,))
     if reference or fastsam or not (clipseg and clip):  # the reference, or random bundles
@@ -128,10 +128,7 @@ def benchmark(
         found['fastsam'] = fastsam_figures(*measured)
         ways = [way for way in measured if way is not None]
         text += '\n' + markdown(ways, found['fastsam'], 'FastSAM-s, 50 segments, 13 terms.')
-    typer.echo(text)
-    table.write_text(text, encoding='utf-8')
-    if json_file is not None:
-        _write_json(json_file, found)
+    _write(text, found, table, json_file)
 
 
 def _sweep(clipseg: str, work: Path, threads: int, table: Path, json_file: Path | None) -> None:
@@ -143,11 +140,8 @@ def _sweep(clipseg: str, work: Path, threads: int, table: Path, json_file: Path 
         bundles = {precision: str(made[name]) for precision, name in names.items()}
     conditions = describe_machine(threads, len(TERMS_13))
     rows = run_sweep(bundles, threads, typer.echo)
-    text = sweep_table(rows, conditions)
-    typer.echo(text)
-    table.write_text(text, encoding='utf-8')
-    if json_file is not None:
-        _write_json(json_file, {'sweep': rows, 'sweep_conditions': conditions})
+    found = {'sweep': rows, 'sweep_conditions': conditions}
+    _write(sweep_table(rows, conditions), found, table, json_file)
 
 
 def _measure_fastsam(
@@ -183,7 +177,10 @@ def _measure(name: str, **arguments: Any) -> Measured:
     return measured
 
 
-def _write_json(file: Path, figures: dict[str, Any]) -> None:
-    # What was not measured this time stays.
-    kept = json.loads(file.read_text(encoding='utf-8')) if file.is_file() else {}
-    file.write_text(json.dumps({**kept, **figures}, indent=2) + '\n', encoding='utf-8')
+def _write(text: str, figures: dict[str, Any], table: Path, json_file: Path | None) -> None:
+    typer.echo(text)
+    table.write_text(text, encoding='utf-8')
+    if json_file is not None:
+        # What was not measured this time stays.
+        kept = json.loads(json_file.read_text(encoding='utf-8')) if json_file.is_file() else {}
+        json_file.write_text(json.dumps({**kept, **figures}, indent=2) + '\n', encoding='utf-8')

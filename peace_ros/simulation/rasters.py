@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from math import atan2, cos, degrees, hypot, isclose, radians, sin, sqrt
+from math import atan2, degrees, hypot, isclose, isfinite, sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -84,20 +84,6 @@ def read_indices(path: Path) -> NDArray[Any]:
             'table with colours'
         )
     return np.ascontiguousarray(raster[..., 0])
-
-
-def read_colours(path: Path) -> NDArray[np.uint8]:
-    """Return height x width x 3 RGB of a coloured label image; raises RasterError."""
-    data = _bytes_of(path)
-    if data[:4] in _TIFF:
-        return read_photo(path).rgb
-    raster = _decoded(data, cv2.IMREAD_UNCHANGED, path)
-    if raster.ndim != 3 or raster.dtype != np.uint8:
-        raise RasterError(
-            f'{path}: {raster.ndim} axes of {raster.dtype}, but a colour image is needed: give '
-            'RGB, or a class table with indices'
-        )
-    return np.ascontiguousarray(raster[..., 2::-1], np.uint8)
 
 
 def read_gsd_m(path: Path) -> float:
@@ -304,28 +290,18 @@ def _gsd_m(dataset: Any, path: Path) -> float:
     return grid_m if isclose(grid_m, across_m, rel_tol=_SAME) else across_m
 
 
-def _ground_vectors_m(dataset: Any, path: Path) -> tuple[tuple[float, float], tuple[float, float]]:
+def _ground_vectors_m(dataset: Any, path: Path) -> list[NDArray[np.float64]]:
     """Return (east, north) of one pixel to the right and one up, in the middle of the image.
 
-    From latitude and longitude on the ellipsoid WGS 84, so that any projection and unit will do.
+    On a plane that touches the ellipsoid there, so that any projection and unit will do.
     """
     from rasterio.warp import transform  # noqa: PLC0415 -- optional
 
     column, row, step = dataset.width / 2, dataset.height / 2, 100.0
     places = dataset.xy([row, row, row - step], [column, column + step, column])
-    longitudes, latitudes = transform(dataset.crs, 'EPSG:4326', *places)
-    if not np.isfinite([longitudes, latitudes]).all():
+    longitude, latitude = (each[0] for each in transform(dataset.crs, 'EPSG:4326', *places))
+    if not isfinite(longitude + latitude):
         raise RasterError(f'{path} lies outside of its reference system: {_GSD_REMEDY}')
-    eccentricity2, equator_m = 0.00669437999, 6378137.0
-    latitude = radians(latitudes[0])
-    curvature = 1.0 - eccentricity2 * sin(latitude) ** 2
-    east_m = equator_m / sqrt(curvature) * cos(latitude)
-    north_m = equator_m * (1.0 - eccentricity2) / curvature**1.5
-    right, up = (
-        (
-            radians(longitudes[each] - longitudes[0]) * east_m / step,
-            radians(latitudes[each] - latitudes[0]) * north_m / step,
-        )
-        for each in (1, 2)
-    )
-    return right, up
+    plane = f'+proj=aeqd +datum=WGS84 +lat_0={latitude} +lon_0={longitude}'
+    on_ground = np.array(transform(dataset.crs, plane, *places)).T
+    return [(end - on_ground[0]) / step for end in on_ground[1:]]

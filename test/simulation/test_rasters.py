@@ -21,7 +21,6 @@ from peace_ros.simulation import load_world
 from peace_ros.simulation.rasters import (
     RasterError,
     _tell_scaling,
-    read_colours,
     read_gsd_m,
     read_indices,
     read_photo,
@@ -244,9 +243,6 @@ def test_grey_saved_as_colour_still_holds_indices_and_colours_do_not(tmp_path: P
     cv2.imwrite(str(tmp_path / 'colour.png'), grey)
     with pytest.raises(RasterError, match='a colour image, but class indices are needed'):
         read_indices(tmp_path / 'colour.png')
-    cv2.imwrite(str(tmp_path / 'one.png'), np.zeros((2, 2), np.uint8))
-    with pytest.raises(RasterError, match='but a colour image is needed'):
-        read_colours(tmp_path / 'one.png')
 
 
 def test_unreadable_files_are_named(tmp_path: Path) -> None:

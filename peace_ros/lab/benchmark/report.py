@@ -8,16 +8,18 @@ import os
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import onnxruntime as ort
 
 from peace_ros.lab.benchmark.measure import Measured
+from peace_ros.lab.markdown import markdown_table
 
 Figures = dict[str, Any]
 
 
-NO_BLABBERSEG = 'BlabberSeg is a scheme for CLIPSeg; there is none of FastSAM to compare with'
+NO_BLABBERSEG = 'BlabberSeg is a scheme for CLIPSeg; it has no counterpart for FastSAM'
 
 
 def clipseg_figures(
@@ -88,23 +90,24 @@ def _busy_ratio(other: Measured | None, ours: Measured) -> float | None:
 
 def markdown(ways: Sequence[Measured], figures: Figures, conditions: str) -> str:
     """Return the table that is printed and saved."""
-    lines = [
-        f'# peace benchmark\n\n{conditions}\n',
-        '| way | networks | stage | p50 ms | p95 ms | p99 ms | frames/s |',
-        '|---|---|---|---:|---:|---:|---:|',
-    ]
-    for way in ways:
-        for stage, spread in way.stages_ms.items():
-            rate = f'{1e3 / spread.mean:.2f}' if stage == 'frame' else ''
-            lines.append(
-                f'| {way.name} | {way.conditions} | {stage} | {spread.p50:.1f} | '
-                f'{spread.p95:.1f} | {spread.p99:.1f} | {rate} |'
+    stages = markdown_table(
+        ('way', 'networks', 'stage', 'p50 ms', 'p95 ms', 'p99 ms', 'frames/s'),
+        'lllrrrr',
+        (
+            (
+                way.name,
+                way.conditions,
+                stage,
+                *(f'{each:.1f}' for each in (spread.p50, spread.p95, spread.p99)),
+                f'{1e3 / spread.mean:.2f}' if stage == 'frame' else '',
             )
-    lines += ['', '| figure | value |', '|---|---|']
-    for name, value in figures.items():
-        if name != 'ways':
-            lines.append(f'| {name} | {_text(value)} |')
-    return '\n'.join(lines) + '\n'
+            for way in ways
+            for stage, spread in way.stages_ms.items()
+        ),
+    )
+    shown = [(name, _text(value)) for name, value in figures.items() if name != 'ways']
+    values = markdown_table(('figure', 'value'), 'll', shown)
+    return f'# peace benchmark\n\n{conditions}\n\n{stages}\n\n{values}\n'
 
 
 def describe_machine(threads: int, terms: int) -> str:
@@ -118,11 +121,9 @@ def describe_machine(threads: int, terms: int) -> str:
 
 
 def _processor() -> str:
-    try:
-        with open('/proc/cpuinfo', encoding='utf-8') as file:  # noqa: PTH123 - not a real file
-            names = [line.split(':', 1)[1].strip() for line in file if 'model name' in line]
-    except OSError:
-        names = []
+    file = Path('/proc/cpuinfo')
+    lines = file.read_text(encoding='utf-8').splitlines() if file.is_file() else []
+    names = [line.split(':', 1)[1].strip() for line in lines if 'model name' in line]
     return names[0] if names else platform.machine()
 
 

@@ -22,6 +22,7 @@ from peace_ros.core.inference.session import OPTIMISATIONS
 from peace_ros.lab.benchmark.measure import Stopwatch, peak_rss_mb
 from peace_ros.lab.benchmark.scene import IS_POSITIVE_13, TERMS_13, draw_frames
 from peace_ros.lab.benchmark.worker import run_apart
+from peace_ros.lab.markdown import markdown_table
 
 Row = dict[str, Any]
 
@@ -104,18 +105,20 @@ def measure_setting(bundle: str, provider: str, threads: int, optimisation: str)
 
 def sweep_table(rows: Sequence[Row], conditions: str) -> str:
     """Return Markdown, the fastest setting first."""
-    lines = [
-        f'# peace benchmark --sweep\n\n{conditions}\n',
-        f'| {" | ".join(_COLUMNS)} |',
-        '|---|---|---:|---|---:|---:|---:|---:|---:|',
-    ]
-    for row in sorted(rows, key=lambda each: float(each['networks_ms'])):
-        provider = str(row['provider']).removesuffix('ExecutionProvider')
-        # OpenVINO optimises in its own way.
-        optimisation = row['optimisation'] if row['provider'] == CPU else 'its own'
-        lines.append(
-            f'| {row["precision"]} | {provider} | {row["threads"]} | {optimisation} | '
-            f'{row["encoder_ms"]:.0f} | {row["decoder_ms"]:.0f} | {row["networks_ms"]:.0f} | '
-            f'{row["processor_ms"]:.0f} | {row["peak_rss_mb"]:.0f} |'
-        )
-    return '\n'.join(lines) + '\n'
+    times = ('encoder_ms', 'decoder_ms', 'networks_ms', 'processor_ms', 'peak_rss_mb')
+    table = markdown_table(
+        _COLUMNS,
+        'llrlrrrrr',
+        (
+            (
+                row['precision'],
+                str(row['provider']).removesuffix('ExecutionProvider'),
+                str(row['threads']),
+                # OpenVINO optimises in its own way.
+                row['optimisation'] if row['provider'] == CPU else 'its own',
+                *(f'{row[each]:.0f}' for each in times),
+            )
+            for row in sorted(rows, key=lambda each: float(each['networks_ms']))
+        ),
+    )
+    return f'# peace benchmark --sweep\n\n{conditions}\n\n{table}\n'

@@ -12,18 +12,17 @@ end the decisions stop, and the time until the first zero is the dead-man.
 
 from __future__ import annotations
 
-import argparse
 import json
 import multiprocessing
 import socket
-import sys
 import threading
 import time
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from itertools import pairwise
 from multiprocessing.connection import Connection
+from typing import Annotated
 
+import numpy as np
+import typer
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain.motion import Setpoint
@@ -78,7 +77,7 @@ def _command(port: int, seconds: float, rate_hz: float) -> float:
     """Fly for a while; return the steady clock of the last decision."""
     link = open_vehicle(f'udpout:127.0.0.1:{port}', timeout_s=30.0)
     rest = threading.Event()
-    threading.Thread(target=_never_rest, args=(rest,), daemon=True).start()
+    threading.Thread(target=_burn, args=(rest,), daemon=True).start()
     sender = SetpointSender(link, parameters=SenderParameters(rate_hz=rate_hz))
     sender.start()
     until = time.monotonic() + seconds + WARM_UP_S
@@ -97,17 +96,12 @@ def _command(port: int, seconds: float, rate_hz: float) -> float:
 def _evaluate(seen: list[Seen], last_s: float) -> Gaps:
     begin_s = seen[0][0] + WARM_UP_S if seen else 0.0
     moving = [at_s for at_s, north in seen if north != 0.0 and at_s >= begin_s]
-    gaps_ms = sorted(1e3 * (b - a) for a, b in pairwise(moving))
     zeros = [at_s for at_s, north in seen if north == 0.0 and at_s > last_s]
-    if not gaps_ms or not zeros:
+    if len(moving) < 2 or not zeros:
         return Gaps(len(moving), *(4 * (float('inf'),)))
-    return Gaps(
-        len(moving),
-        gaps_ms[len(gaps_ms) // 2],
-        gaps_ms[min(len(gaps_ms) - 1, int(0.99 * len(gaps_ms)))],
-        gaps_ms[-1],
-        1e3 * (zeros[0] - last_s),
-    )
+    median, p99, longest = np.percentile(1e3 * np.diff(moving), [50, 99, 100], method='higher')
+    dead_man_ms = 1e3 * (zeros[0] - last_s)
+    return Gaps(len(moving), float(median), float(p99), float(longest), dead_man_ms)
 
 
 def _play_autopilot(report: Connection, ended: threading.Event) -> None:
@@ -142,24 +136,17 @@ def _burn(ended: threading.Event) -> None:
             number = number * 1103515245 % 2147483647
 
 
-def _never_rest(ended: threading.Event) -> None:
-    _burn(ended)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure, print the result as JSON, and tell whether the limits hold."""
-    parser = argparse.ArgumentParser(
-        prog='python -m peace_ros.lab.evaluation.setpoint_gaps',
-        description=(__doc__ or '').split('\n', 1)[0],
-    )
-    parser.add_argument('--seconds', type=float, default=30.0)
-    parser.add_argument('--rate', type=float, default=10.0, help='set-points per second')
-    parser.add_argument('--workers', type=int, default=2, help='processes that never rest')
-    given = parser.parse_args(arguments)
-    gaps = measure(given.seconds, given.rate, given.workers)
-    sys.stdout.write(json.dumps(asdict(gaps)) + '\n')
-    return 0 if gaps.p99_ms <= P99_MS and gaps.dead_man_ms <= DEAD_MAN_MS else 1
+def main(
+    seconds: float = 30.0,
+    rate: Annotated[float, typer.Option(help='Set-points per second.')] = 10.0,
+    workers: Annotated[int, typer.Option(help='Processes that never rest.')] = 2,
+) -> None:
+    """Measure, print the result as JSON, and exit with status 1 when a limit does not hold."""
+    gaps = measure(seconds, rate, workers)
+    typer.echo(json.dumps(asdict(gaps)))
+    if gaps.p99_ms > P99_MS or gaps.dead_man_ms > DEAD_MAN_MS:
+        raise typer.Exit(1)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    typer.run(main)

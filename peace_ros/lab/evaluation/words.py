@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Does CLIP say "fog" of a frame in fog? Real frames under ten conditions."""
+"""How often CLIP ranks the right condition word first: real frames under ten conditions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CONDITIONS: dict[str, str] = {
     'evening': 'evening',
     'cloudy': 'cloudy',
 }
-"""Word -> the condition of ``simulation.drawing`` that it should be said of."""
+"""Word -> the condition of ``simulation.drawing`` for which it is the right one."""
 FRAME_PX = 352
 Image = NDArray[np.uint8]
 
@@ -44,7 +44,7 @@ class WordFigures:
 
     @property
     def right_by_word(self) -> dict[str, float]:
-        """Word -> share of its frames of which it was said first."""
+        """Word -> share of the frames under its condition for which it came first."""
         shares = np.diag(self.counts) / np.maximum(self.counts.sum(axis=1), 1)
         return dict(zip(self.words, shares.astype(float).tolist(), strict=True))
 
@@ -81,7 +81,7 @@ def measure(
         encoder: CLIP.
         seed: of the conditions' variation.
         strength: of the conditions, 0 to 1; None varies it between 0.35 and 1.
-        watch: shows how far it is.
+        watch: yields the images, and may show the progress.
     """
     words = tuple(CONDITIONS)
     texts = encoder.text_embeddings(list(words))

@@ -83,7 +83,7 @@ def test_wrong_tables_are_refused(classes: Any, complaint: str) -> None:
 
 def test_two_classes_of_one_index_are_refused() -> None:
     rows = [{'name': name, 'index': 1, 'label': 'grass'} for name in 'ab']
-    with pytest.raises(DatasetError, match='class b: its value is there twice'):
+    with pytest.raises(DatasetError, match='class b: its value is used twice'):
         parse_classes({'classes': {'safe': rows}}, 'mine.yaml').converter('indices', 'ignore')
 
 

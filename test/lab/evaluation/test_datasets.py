@@ -142,7 +142,7 @@ def test_unknown_datasets_splits_and_folders_are_refused(tmp_path: Path) -> None
         dataset_source('vdd', tmp_path, '', 'ignore')
     with pytest.raises(DatasetError, match="'nothing' does not exist"):
         dataset_source('nothing', tmp_path, '', 'ignore')
-    with pytest.raises(DatasetError, match='is no folder'):
+    with pytest.raises(DatasetError, match='is not a folder'):
         dataset_source('vdd', tmp_path / 'x', '', 'ignore')
     write(tmp_path / 'train/src/a.JPG', np.zeros((2, 4, 3), np.uint8))
     with pytest.raises(DatasetError, match="split 'spring' of vdd: choose one of train, val"):

@@ -255,7 +255,7 @@ def test_the_command_writes_figures_with_intervals(tmp_path: Path) -> None:
     ('options', 'complaint'),
     [
         (['--drawn', '1', '--save'], '--save without --max-false-safe'),
-        (['--images', '/nowhere', '--labels', '/nowhere'], 'is no folder'),
+        (['--images', '/nowhere', '--labels', '/nowhere'], 'is not a folder'),
         (['--drawn', '1', '--threshold', '1.0'], '--threshold 1.0'),
         (['no_such', '--drawn', '1'], "preset 'no_such' does not exist"),
     ],

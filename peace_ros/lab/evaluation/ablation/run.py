@@ -35,7 +35,7 @@ Counts = NDArray[np.uint32]
 
 @dataclass(frozen=True)
 class Counted:
-    """What every variant did on every frame."""
+    """The counts of every variant on every frame."""
 
     counts: dict[Key, NDArray[np.uint32]]
     """[frames, LABELS, BINS]; with the set difference the bundle's threshold stands at one half."""
@@ -56,7 +56,7 @@ class _Bench:
             )
         threads = cores.segmentation.threads
         self.segmenter = FeatureSegmenter(
-            cores.bundle, cores.segmenter.terms, threads, cores.own.clipseg_max_looks
+            cores.bundle, cores.segmenter.terms, cores.segmentation, cores.own
         )
         encoder = SharedEncoder(ClipEncoder(Bundle.load(cores.prompting.bundle), threads=threads))
         opposite = OppositeEncoder(encoder)
@@ -77,14 +77,13 @@ class _Bench:
 
     def look(self, frame: Frame, labels: NDArray[np.uint8]) -> Iterator[tuple[Key, Counts]]:
         """Yield the counts of every variant and fusion on one image."""
-        features = self.segmenter.encode(frame)
         by_template: dict[str, dict[str, Counts]] = {}
         for variant, generator in self._generators:
             generator.reset()
             prompt = generator.generate(frame)
             # Variants often come to the same prompt; it is decoded once.
             if prompt.template not in by_template:
-                scores = self.segmenter.scores(features, prompt, tuple(FUSIONS))
+                scores = self.segmenter.scores(frame, prompt)
                 by_template[prompt.template] = {
                     name: count_labels(
                         labels, fitted(calibrated(each, self._standing[name]), labels.shape)
@@ -112,7 +111,7 @@ def ablate(
         variants: ways to write prompts.
         tile_px: see :func:`tiles_of`; None also takes what the source suggests.
         strict: see :func:`readable`.
-        watch: shows how far it is.
+        watch: yields the samples, and may show the progress.
 
     Raises:
         DatasetError: see :func:`readable`.
@@ -132,4 +131,4 @@ def ablate(
         for key, each in sums.items():
             counts[key].append(each)
     stacked = {key: np.stack(each) for key, each in counts.items()}
-    return Counted(stacked, tuple(names), tuple(skipped), bench.segmenter.encodings)
+    return Counted(stacked, tuple(names), tuple(skipped), bench.segmenter.calls['image_encoder'])

@@ -11,6 +11,7 @@ from peace_ros.core.domain import ConfigurationError
 from peace_ros.lab.evaluation.ablation.figures import RECALL, Figures
 from peace_ros.lab.evaluation.ablation.variants import DEFAULT, GROUPS, VOCABULARY, WORDS
 from peace_ros.lab.evaluation.segmentation.table import percent
+from peace_ros.lab.markdown import markdown_table
 
 BEGIN, END = '<!-- ablation: begin -->', '<!-- ablation: end -->'
 _COLUMNS = (
@@ -22,6 +23,7 @@ _COLUMNS = (
     'false-safe',
     'recall',
 )
+_RATES = ('average_precision', 'false_safe_at_recall', 'miou', 'false_safe', 'recall')
 _TITLES = {
     'vocabulary': 'Vocabularies',
     'template': 'Templates',
@@ -59,23 +61,19 @@ def _default_name(group: str) -> str:
 
 
 def _table(title: str, rows: list[tuple[str, Figures]]) -> str:
-    lines = [
-        f'| {title} | {" | ".join(_COLUMNS)} |',
-        f'|---|{"---:|" * len(_COLUMNS)}',
-    ]
-    for name, row in rows:
-        shown = f'**{_escaped(name)}**' if row['is_default'] else _escaped(name)
-        cells = (
-            percent(row['best_miou']),
-            '' if row['is_default'] else _difference(row),
-            percent(row['average_precision']),
-            percent(row['false_safe_at_recall']),
-            percent(row['miou']),
-            percent(row['false_safe']),
-            percent(row['recall']),
-        )
-        lines.append(f'| {shown} | {" | ".join(cells)} |')
-    return '\n'.join(lines)
+    return markdown_table(
+        (title, *_COLUMNS),
+        'l' + 'r' * len(_COLUMNS),
+        (
+            (
+                f'**{name}**' if row['is_default'] else name,
+                percent(row['best_miou']),
+                '' if row['is_default'] else _difference(row),
+                *(percent(row[key]) for key in _RATES),
+            )
+            for name, row in rows
+        ),
+    )
 
 
 def _difference(row: Figures) -> str:
@@ -89,19 +87,17 @@ def _difference(row: Figures) -> str:
 
 
 def _thresholds(rows: list[dict[str, Any]]) -> str:
-    lines = [
-        '| Threshold | mIoU | false-safe | recall | person called safe |',
-        '|---|' + '---:|' * 4,
-    ]
-    for row in rows:
-        name = f'**{row["threshold"]:.3f}**' if row['is_default'] else f'{row["threshold"]:.3f}'
-        cells = (percent(row[key]) for key in ('miou', 'false_safe', 'recall', 'person'))
-        lines.append(f'| {name} | {" | ".join(cells)} |')
-    return '\n'.join(lines)
-
-
-def _escaped(text: str) -> str:
-    return text.replace('|', '\\|')
+    return markdown_table(
+        ('Threshold', 'mIoU', 'false-safe', 'recall', 'person called safe'),
+        'lrrrr',
+        (
+            (
+                f'**{row["threshold"]:.3f}**' if row['is_default'] else f'{row["threshold"]:.3f}',
+                *(percent(row[key]) for key in ('miou', 'false_safe', 'recall', 'person')),
+            )
+            for row in rows
+        ),
+    )
 
 
 def put_into(document: Path, text: str) -> None:

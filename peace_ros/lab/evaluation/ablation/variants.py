@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The prompts that are held against each other: each differs from the default in one thing."""
+"""The prompts that are compared: each differs from the default in one thing."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Class tables: what the values or colours of a label raster mean to a vehicle that lands."""
+"""Class tables: which label each value or colour of a label raster stands for."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class ClassTable:
                     'images need: add its index or colour'
                 )
             if key in keys:
-                raise DatasetError(f'{self.where}: class {each.name}: its value is there twice')
+                raise DatasetError(f'{self.where}: class {each.name}: its value is used twice')
             keys[key] = each.counted_as(mixed)
         return Converter(masks, keys)
 
@@ -213,32 +213,30 @@ def _entry(side: str, row: Any, where: str) -> ClassEntry:
     index, colour = row.get('index'), row.get('colour')
     if index is None and colour is None:
         raise DatasetError(f'{where}: has neither index nor colour: give one')
-    if index is not None and not (type(index) is int and 0 <= index <= 255):
+    if index is not None and not _are_bytes([index]):
         raise DatasetError(f'{where}: index {index!r}: give 0 to 255')
-    return ClassEntry(row['name'], side, label, or_label, index, _colour(colour, where))
+    fits = isinstance(colour, list) and len(colour) == 3 and _are_bytes(colour)
+    if colour is not None and not fits:
+        raise DatasetError(f'{where}: colour {colour!r}: give [red, green, blue], 0 to 255')
+    return ClassEntry(row['name'], side, label, or_label, index, colour and tuple(colour))
+
+
+def _are_bytes(values: list[Any]) -> bool:
+    return all(type(each) is int and 0 <= each <= 255 for each in values)
 
 
 def _label(name: Any, where: str, *, safe: bool) -> Label:
-    known = {each.name.lower(): each for each in Label if each != Label.UNLABELED}
-    label = known.get(str(name))
-    if label is None or (label in SAFE_LABELS) != safe:
-        fitting = [key for key, each in known.items() if (each in SAFE_LABELS) == safe]
+    fitting = {
+        each.name.lower(): each
+        for each in Label
+        if each != Label.UNLABELED and (each in SAFE_LABELS) == safe
+    }
+    if str(name) not in fitting:
         raise DatasetError(
             f'{where}: label {name!r} on this side: give one of {", ".join(fitting)}'
         )
-    return label
-
-
-def _colour(colour: Any, where: str) -> tuple[int, int, int] | None:
-    if colour is None:
-        return None
-    fits = isinstance(colour, list) and len(colour) == 3
-    if not fits or not all(type(each) is int and 0 <= each <= 255 for each in colour):
-        raise DatasetError(f'{where}: colour {colour!r}: give [red, green, blue], 0 to 255')
-    return colour[0], colour[1], colour[2]
+    return fitting[str(name)]
 
 
 def _packed(colour_rgb: tuple[int, int, int] | None) -> int | None:
-    if colour_rgb is None:
-        return None
-    return colour_rgb[0] << 16 | colour_rgb[1] << 8 | colour_rgb[2]
+    return None if colour_rgb is None else int.from_bytes(bytes(colour_rgb), 'big')

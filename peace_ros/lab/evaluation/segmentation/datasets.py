@@ -17,11 +17,9 @@ from peace_ros.lab.evaluation.segmentation.classes import (
 )
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError
 from peace_ros.lab.evaluation.segmentation.samples import (
-    FileSample,
-    Sample,
     SampleSource,
-    Skipped,
     mixed_remark,
+    paired,
 )
 from peace_ros.simulation.rasters import IMAGE_SUFFIXES
 
@@ -45,19 +43,22 @@ def dataset_source(name: str, root: Path, split: str, mixed: str) -> SampleSourc
     content = read_yaml(path)
     table = parse_classes(content, str(path))
     if not root.is_dir():
-        raise DatasetError(f'--root {root} is no folder: give the one that holds {name}')
+        raise DatasetError(f'--root {root} is not a folder: give the one that holds {name}')
     layout, images = _find(content, root, path)
     chosen = _of_split(images, content, root, split, path)
-    convert = table.converter(layout['masks'], mixed)
-    samples: list[Sample] = []
-    skipped = []
-    for image in chosen:
-        label = _label_of(image, layout)
-        shown = str(image.relative_to(root))
-        if label.is_file():
-            samples.append(FileSample(shown, image, label, convert))
-        else:
-            skipped.append(Skipped(shown, f'no label: {label} does not exist'))
+    labels = {image: _label_of(image, layout) for image in chosen}
+    samples, skipped = paired(
+        (
+            (
+                str(image.relative_to(root)),
+                image,
+                label if label.is_file() else None,
+                f'no label: {label} does not exist',
+            )
+            for image, label in labels.items()
+        ),
+        table.converter(layout['masks'], mixed),
+    )
     title = f'{content.get("title", name)}{f", {split}" if split else ""}'
     remarks = [mixed_remark(each.name, mixed) for each in table.entries if each.side == 'mixed']
     if not table.has_safe(mixed):
@@ -67,7 +68,7 @@ def dataset_source(name: str, root: Path, split: str, mixed: str) -> SampleSourc
         )
     return SampleSource(
         title,
-        tuple(samples),
+        samples,
         tuple(skipped),
         whole_number(content, 'tile_px', 16, path),
         tuple(remarks),

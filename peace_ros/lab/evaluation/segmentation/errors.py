@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What can be wrong with labelled images."""
+"""Errors in labelled images."""
 
 from peace_ros.core.domain import ConfigurationError, PeaceError
 

@@ -50,7 +50,7 @@ def figures_of(
 
     Args:
         cores: the configuration.
-        tally: what it was found to do.
+        tally: its counts.
         outcome: of the run.
         own_threshold: the network's score from which ground is called safe; None: the one that
             the bundle recommends.

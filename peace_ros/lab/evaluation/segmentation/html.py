@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The report for someone who was not there: one page without other files.
+"""The report of an evaluation: one page that needs no other file.
 
 Needs jinja2 and matplotlib (the extra ``lab``); the page itself is ``templates/report.html.j2``.
 """

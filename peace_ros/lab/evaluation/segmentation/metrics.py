@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import SAFE_LABELS, Label
-from peace_ros.lab.evaluation.segmentation.histograms import BINS, middles
+from peace_ros.lab.evaluation.segmentation.histograms import middles
 
 Array = NDArray[np.float64]
 
@@ -56,48 +56,26 @@ class Areas:
         safe, unsafe = wide[..., SAFE, :].sum(-2), wide[..., UNSAFE, :].sum(-2)
         self.safe_called, self.safe_missed = _split(safe, threshold_bin)
         self.unsafe_called, self.unsafe_kept = _split(unsafe, threshold_bin)
-
-    @property
-    def iou_safe(self) -> Array:
-        """Intersection over union of safe ground."""
-        return ratio(self.safe_called, self.safe_called + self.safe_missed + self.unsafe_called)
-
-    @property
-    def iou_unsafe(self) -> Array:
-        """Intersection over union of unsafe ground."""
-        return ratio(self.unsafe_kept, self.unsafe_kept + self.unsafe_called + self.safe_missed)
-
-    @property
-    def miou(self) -> Array:
-        """Mean of both."""
-        return (self.iou_safe + self.iou_unsafe) / 2.0
-
-    @property
-    def false_safe(self) -> Array:
-        """Share of the ground called safe that is unsafe."""
-        return ratio(self.unsafe_called, self.unsafe_called + self.safe_called)
-
-    @property
-    def recall(self) -> Array:
-        """Share of safe ground that is called safe."""
-        return ratio(self.safe_called, self.safe_called + self.safe_missed)
-
-    @property
-    def called_safe(self) -> Array:
-        """Share of all labelled ground that is called safe."""
+        all_safe = self.safe_called + self.safe_missed
+        all_unsafe = self.unsafe_called + self.unsafe_kept
         called = self.safe_called + self.unsafe_called
-        return ratio(called, called + self.safe_missed + self.unsafe_kept)
-
-    @property
-    def unsafe_called_safe(self) -> Array:
+        self.iou_safe = ratio(self.safe_called, all_safe + self.unsafe_called)
+        """Intersection over union of safe ground."""
+        self.iou_unsafe = ratio(self.unsafe_kept, all_unsafe + self.safe_missed)
+        """Intersection over union of unsafe ground."""
+        self.miou = (self.iou_safe + self.iou_unsafe) / 2.0
+        """Mean of both."""
+        self.false_safe = ratio(self.unsafe_called, called)
+        """Share of the ground called safe that is unsafe."""
+        self.recall = ratio(self.safe_called, all_safe)
+        """Share of safe ground that is called safe."""
+        self.called_safe = ratio(called, all_safe + all_unsafe)
+        """Share of all labelled ground that is called safe."""
+        self.unsafe_called_safe = ratio(self.unsafe_called, all_unsafe)
         """Share of unsafe ground that is called safe."""
-        return ratio(self.unsafe_called, self.unsafe_called + self.unsafe_kept)
-
-    @property
-    def baseline_miou(self) -> Array:
+        baseline = ratio(all_unsafe, all_safe + all_unsafe) / 2.0
+        self.baseline_miou = np.where(all_safe > 0, baseline, np.nan)
         """Mean IoU of an answer that calls everything unsafe."""
-        safe, unsafe = self.safe_called + self.safe_missed, self.unsafe_called + self.unsafe_kept
-        return np.where(safe > 0, ratio(unsafe, safe + unsafe) / 2.0, np.nan)
 
 
 def _split(counts: Array, threshold_bin: int | None) -> tuple[Array, Array]:
@@ -119,17 +97,13 @@ def share_called_safe(counts: NDArray[np.generic], label: Label, threshold_bin: 
     return ratio(of_label[..., threshold_bin:].sum(-1), of_label.sum(-1))
 
 
-def _calibration_groups() -> NDArray[np.intp]:
-    return np.minimum((middles() * CALIBRATION_BINS).astype(np.intp), CALIBRATION_BINS - 1)
-
-
 def reliability(counts: NDArray[np.generic]) -> tuple[Array, Array, Array]:
     """Return mean score, share of safe ground and pixels, each [..., CALIBRATION_BINS]."""
     wide = np.asarray(counts, np.float64)
     safe = wide[..., SAFE, :].sum(-2)
     every = safe + wide[..., UNSAFE, :].sum(-2)
-    member = np.zeros((BINS, CALIBRATION_BINS))
-    member[np.arange(BINS), _calibration_groups()] = 1.0
+    groups = np.minimum((middles() * CALIBRATION_BINS).astype(np.intp), CALIBRATION_BINS - 1)
+    member = np.eye(CALIBRATION_BINS)[groups]
     pixels = every @ member
     return ratio((every * middles()) @ member, pixels), ratio(safe @ member, pixels), pixels
 

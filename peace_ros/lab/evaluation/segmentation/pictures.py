@@ -77,11 +77,7 @@ def _safety(
         )
         if bottom == top or right == left:
             continue
-        rows = slice(tile.own_rows.start - tile.rows.start, tile.own_rows.stop - tile.rows.start)
-        columns = slice(
-            tile.own_columns.start - tile.columns.start, tile.own_columns.stop - tile.columns.start
-        )
-        own = np.ascontiguousarray(look.safety[rows, columns])
+        own = np.ascontiguousarray(look.safety[tile.own])
         safety[top:bottom, left:right] = cv2.resize(
             own, (right - left, bottom - top), interpolation=cv2.INTER_AREA
         )

@@ -28,12 +28,12 @@ from peace_ros.lab.evaluation.segmentation.term_labels import load_term_labels, 
 from peace_ros.lab.evaluation.segmentation.tiles import Tile, tiles_of
 
 Watch = Callable[[Sequence[Sample]], Iterable[Sample]]
-"""Hands samples on one by one, and may show how far it is."""
+"""Yields the samples, and may show the progress."""
 
 
 @dataclass
 class Tally:
-    """What one configuration was found to do, frame by frame."""
+    """The counts of one configuration, frame by frame."""
 
     terms: tuple[str, ...]
     """Terms that mean a label."""
@@ -68,7 +68,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came out of a source."""
+    """The result of an evaluation."""
 
     source: SampleSource
     tallies: dict[str, Tally]
@@ -97,7 +97,7 @@ def readable(
         source: labelled images.
         skipped: gets what is not scored.
         strict: refuse the first sample that cannot be scored instead of skipping it.
-        watch: shows how far it is.
+        watch: yields the samples, and may show the progress.
 
     Raises:
         DatasetError: nothing could be scored, or ``strict`` and something could not.
@@ -148,7 +148,7 @@ def looks(
     tile_px: int | None,
     refuse: Callable[[str], object] = lambda _: None,
 ) -> Iterator[TileLook]:
-    """Yield what a configuration makes of each tile; ``refuse`` is told why there is none of one.
+    """Yield the heatmap of a configuration for each tile; ``refuse`` gets the reason for none.
 
     A flight gets no heatmap of such an image either.
     """
@@ -182,7 +182,7 @@ def evaluate(
         tile_px: see :func:`tiles_of`; None also takes what the source suggests.
         strict: see :func:`readable`.
         score_terms: also score each term by itself; each frame is then encoded twice.
-        watch: shows how far it is.
+        watch: yields the samples, and may show the progress.
 
     Raises:
         DatasetError: see :func:`readable`.

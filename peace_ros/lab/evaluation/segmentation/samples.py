@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -28,7 +28,6 @@ from peace_ros.simulation.drawing import draw_scene
 from peace_ros.simulation.rasters import (
     IMAGE_SUFFIXES,
     RasterError,
-    read_colours,
     read_indices,
     read_photo,
 )
@@ -52,7 +51,7 @@ class Sample(Protocol):
 
     @property
     def name(self) -> str:
-        """What people call it."""
+        """Name that is shown."""
         ...
 
     def load(self) -> Pair:
@@ -77,7 +76,7 @@ class SampleSource:
     skipped: tuple[Skipped, ...] = ()
     tile_px: int | None = None
     """Side of the square tiles that suits them; None: the shorter side of each image."""
-    remarks: tuple[str, ...] = field(default=())
+    remarks: tuple[str, ...] = ()
     max_looks: int = 0
     """Looks per tile that suit them, see :mod:`peace_ros.core.segmentation.looks`; 0: no matter."""
 
@@ -96,7 +95,7 @@ class FileSample:
         try:
             image, known = read_photo(self.image)
             indices = self.convert.masks == 'indices'
-            raster = read_indices(self.label) if indices else read_colours(self.label)
+            raster = read_indices(self.label) if indices else read_photo(self.label).rgb
         except RasterError as error:
             raise SampleError(str(error)) from error
         if raster.shape[:2] != image.shape[:2]:
@@ -152,6 +151,20 @@ def drawn_source(
     )
 
 
+def paired(
+    pairs: Iterable[tuple[str, Path, Path | None, str]], convert: Converter
+) -> tuple[tuple[Sample, ...], list[Skipped]]:
+    """Return samples, and what has no label, of (name, image, label, reason for no label)."""
+    samples: list[Sample] = []
+    skipped = []
+    for name, image, label, reason in pairs:
+        if label is None:
+            skipped.append(Skipped(name, reason))
+        else:
+            samples.append(FileSample(name, image, label, convert))
+    return tuple(samples), skipped
+
+
 def folder_source(images: Path, labels: Path, classes: str, mixed: str) -> SampleSource:
     """Return the images of a folder (and those below it) with label files of the same stem.
 
@@ -161,29 +174,25 @@ def folder_source(images: Path, labels: Path, classes: str, mixed: str) -> Sampl
     """
     for option, folder in (('--images', images), ('--labels', labels)):
         if not folder.is_dir():
-            raise DatasetError(f'{option} {folder} is no folder: give one')
+            raise DatasetError(f'{option} {folder} is not a folder: give one')
     found = _images(images.rglob('*'))
     if not found:
         raise DatasetError(f'{images} holds no image ({", ".join(IMAGE_SUFFIXES)})')
     convert, remarks = _converter(classes, mixed)
-    samples: list[Sample] = []
-    skipped = []
-    used = set()
+    pairs: list[tuple[str, Path, Path | None, str]] = []
     for image in found:
         name = image.relative_to(images)
         choices = [labels / name.with_name(name.stem + end) for end in ('.png', '_label.png')]
         label = next((each for each in choices if each.is_file()), None)
-        if label is None:
-            skipped.append(Skipped(str(name), f'no label: {choices[0]} does not exist'))
-            continue
-        used.add(label)
-        samples.append(FileSample(str(name), image, label, convert))
+        pairs.append((str(name), image, label, f'no label: {choices[0]} does not exist'))
+    samples, skipped = paired(pairs, convert)
+    used = {label for _, _, label, _ in pairs}
     skipped += [
         Skipped(str(path.relative_to(labels)), 'a label without an image')
         for path in _images(labels.rglob('*'))
         if path not in used and images.resolve() != labels.resolve()
     ]
-    return SampleSource(str(images), tuple(samples), tuple(skipped), remarks=remarks)
+    return SampleSource(str(images), samples, tuple(skipped), remarks=remarks)
 
 
 def manifest_source(manifest: Path, split: str, classes: str, mixed: str) -> SampleSource:
@@ -200,25 +209,33 @@ def manifest_source(manifest: Path, split: str, classes: str, mixed: str) -> Sam
         raise DatasetError(f'{manifest} cannot be read as CSV: {error}') from error
     if not rows or not {'image', 'label'} <= set(rows[0]):
         raise DatasetError(f'{manifest}: give rows with the columns image and label')
-    if split:
+    chosen = [row for row in rows if not split or row.get('split') == split]
+    if not chosen:
         known = sorted({row.get('split') or '' for row in rows})
-        rows = [row for row in rows if row.get('split') == split]
-        if not rows:
-            raise DatasetError(
-                f'{manifest}: no row of split {split!r}: choose one of {", ".join(known)}'
-            )
+        raise DatasetError(
+            f'{manifest}: no row of split {split!r}: choose one of {", ".join(known)}'
+        )
     convert, remarks = _converter(classes, mixed)
-    samples: list[Sample] = []
-    skipped = []
-    for row in rows:
-        image, label = manifest.parent / row['image'], manifest.parent / (row['label'] or '')
-        if not row['label']:
-            skipped.append(Skipped(row['image'], 'no label in the manifest'))
-        else:
-            samples.append(FileSample(row['image'], image, label, convert))
-    title = f'{manifest}{f", split {split}" if split else ""}'
-    max_looks = _looks_of({row.get('dataset') or '' for row in rows})
-    return SampleSource(title, tuple(samples), tuple(skipped), remarks=remarks, max_looks=max_looks)
+    folder, reason = manifest.parent, 'no label in the manifest'
+    samples, skipped = paired(
+        (
+            (
+                row['image'],
+                folder / row['image'],
+                folder / row['label'] if row['label'] else None,
+                reason,
+            )
+            for row in chosen
+        ),
+        convert,
+    )
+    return SampleSource(
+        f'{manifest}{f", split {split}" if split else ""}',
+        samples,
+        tuple(skipped),
+        remarks=remarks,
+        max_looks=_looks_of({row.get('dataset') or '' for row in chosen}),
+    )
 
 
 def _looks_of(datasets: set[str]) -> int:
@@ -260,14 +277,8 @@ def sampled(source: SampleSource, limit: int | None) -> SampleSource:
     if limit is None or limit >= count:
         return source
     places = np.linspace(0, count - 1, limit).round().astype(int).tolist()
-    return SampleSource(
-        f'{source.title}, {limit} of {count}',
-        tuple(source.samples[place] for place in places),
-        source.skipped,
-        source.tile_px,
-        source.remarks,
-        source.max_looks,
-    )
+    chosen = tuple(source.samples[place] for place in places)
+    return replace(source, title=f'{source.title}, {limit} of {count}', samples=chosen)
 
 
 def nearest(labels: NDArray[np.uint8], width_px: int, height_px: int) -> NDArray[np.uint8]:

@@ -75,8 +75,8 @@ def choose_threshold(cores: Cores, tally: Tally, budget: RiskBudget) -> Choice:
         float(limits[at]),
         float(areas.recall[at]),
         float(areas.miou[at]),
-        _known(persons[at]),
-        _known(persons_limits[at]),
+        float(persons[at]) if np.isfinite(persons[at]) else None,
+        float(persons_limits[at]) if np.isfinite(persons_limits[at]) else None,
     )
 
 
@@ -92,10 +92,6 @@ def _upper(values: Array) -> Array:
     some = np.isfinite(values).any(axis=0)
     limits[some] = np.nanquantile(values[:, some], (1.0 + LEVEL) / 2.0, axis=0)
     return limits
-
-
-def _known(value: np.float64) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def _refusal(areas: Areas, limits: Array, budget: RiskBudget, frames: int) -> str:

@@ -26,14 +26,17 @@ class Tile:
     belongs to one tile."""
     own_columns: slice
 
+    @property
+    def own(self) -> tuple[slice, slice]:
+        """Rows and columns that count, within the tile."""
+        return _within(self.own_rows, self.rows), _within(self.own_columns, self.columns)
+
     def labels_of(self, labels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return the labels of the tile; what other tiles count is UNLABELED."""
         own = np.zeros(
             (self.rows.stop - self.rows.start, self.columns.stop - self.columns.start), np.uint8
         )
-        rows = _within(self.own_rows, self.rows)
-        columns = _within(self.own_columns, self.columns)
-        own[rows, columns] = labels[self.own_rows, self.own_columns]
+        own[self.own] = labels[self.own_rows, self.own_columns]
         return own
 
 
