@@ -97,7 +97,7 @@ def rgb_from_compressed(kind: str, data: Any) -> NDArray[np.uint8]:
     lacks with grey and call it a success; Pillow refuses it.
 
     Args:
-        kind: The format field of the message, only quoted; the bytes tell what they are.
+        kind: The format field of the message, only quoted; the bytes themselves are examined.
         data: Anything with the buffer protocol.
 
     Raises:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from peace_ros.core.inference.manifest import InputSpec
 
 MAX_PIXELS = 64_000_000
-"""Larger images are refused: they are no camera frames, and reading them would starve the rest."""
+"""Larger images are refused: cameras do not take them, and they would stall everything else."""
 _FILTERS = {
     'bilinear': Image.Resampling.BILINEAR,
     'bicubic': Image.Resampling.BICUBIC,
