@@ -8,12 +8,14 @@ Nodes and recordings read by the same rules; nothing here imports ROS or a type 
 from __future__ import annotations
 
 import struct
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
 
 from peace_ros.core.domain import ImageError
 
@@ -29,13 +31,8 @@ _TO_RGB = {
     '8UC3': cv2.COLOR_BGR2RGB,  # as OpenCV keeps colours, and cv_bridge with it
     '8UC1': cv2.COLOR_GRAY2RGB,
 }
-_JPEG_START = b'\xff\xd8'
-_JPEG_END = b'\xff\xd9'
-_PNG_START = b'\x89PNG\r\n\x1a\n'
-_PNG_HEADER_BYTES = 24
-_START_OF_FRAME = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
-_START_OF_SCAN = 0xDA
-_WITHOUT_LENGTH = frozenset(range(0xD0, 0xD8)) | {0x01}
+_MODES = frozenset({'1', 'L', 'LA', 'P', 'RGB', 'RGBA', 'CMYK', 'YCbCr'})
+"""Of Pillow, with 8 bits per colour."""
 
 
 def rgb_from_message(message: Any) -> NDArray[np.uint8]:
@@ -96,11 +93,11 @@ def rgb_from_raw(encoding: str, width: int, height: int, step: int, data: Any) -
 def rgb_from_compressed(kind: str, data: Any) -> NDArray[np.uint8]:
     """Return the height x width x 3 RGB array of a JPEG or PNG.
 
-    OpenCV fills what a truncated JPEG lacks with grey and calls it a success, so its end is
-    looked for here, and its size before memory is taken for it.
+    The size is looked at before memory is taken for it. OpenCV would fill what a truncated JPEG
+    lacks with grey and call it a success; Pillow refuses it.
 
     Args:
-        kind: The format field of the message, only quoted; the bytes tell what they are.
+        kind: The format field of the message, only quoted; the bytes themselves are examined.
         data: Anything with the buffer protocol.
 
     Raises:
@@ -108,25 +105,25 @@ def rgb_from_compressed(kind: str, data: Any) -> NDArray[np.uint8]:
 
     """
     encoded = bytes(memoryview(data))
-    if encoded.startswith(_JPEG_START):
-        width, height = _jpeg_size(encoded)
-    elif encoded.startswith(_PNG_START):
-        width, height = _png_size(encoded)
-    else:
-        raise ImageError(
-            f'compressed image of {len(encoded)} bytes with format {kind!r} is neither JPEG nor '
-            'PNG: publish one of them'
-        )
-    _check_size(width, height)
+    told = f'compressed image of {len(encoded)} bytes with format {kind!r}'
     try:
-        bgr = cv2.imdecode(
-            np.frombuffer(encoded, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-        )
-    except cv2.error as error:
-        raise _damaged(kind, encoded) from error
-    if bgr is None:
-        raise _damaged(kind, encoded)
-    return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+        with Image.open(BytesIO(encoded), formats=('JPEG', 'PNG')) as image:
+            _check_size(*image.size)
+            if image.mode not in _MODES:
+                raise ImageError(
+                    f'{told} has pixels of kind {image.mode}: publish 8 bits per colour'
+                )
+            return np.asarray(image.convert('RGB'))
+    except UnidentifiedImageError as error:
+        raise ImageError(
+            f'{told} is neither JPEG nor PNG, or damaged at its start: publish one of them'
+        ) from error
+    except Image.DecompressionBombError as error:
+        raise ImageError(f'{told}: {error}: publish a smaller one') from error
+    except (OSError, SyntaxError, ValueError, struct.error) as error:
+        raise ImageError(
+            f'{told} is damaged or truncated ({error}): check the link that carries it'
+        ) from error
 
 
 def read_image(path: Path | str) -> NDArray[np.uint8]:
@@ -164,48 +161,3 @@ def _check_size(width: int, height: int) -> None:
             f'image of {width} x {height} px: at most {MAX_PIXELS} pixels are taken; '
             'publish a smaller one'
         )
-
-
-def _damaged(kind: str, encoded: bytes) -> ImageError:
-    return ImageError(
-        f'compressed image of {len(encoded)} bytes with format {kind!r} is damaged: '
-        'check the link that carries it'
-    )
-
-
-def _truncated(name: str, encoded: bytes) -> ImageError:
-    return ImageError(
-        f'{name} of {len(encoded)} bytes lacks its end: it was truncated on its way; '
-        'publish whole images'
-    )
-
-
-def _jpeg_size(encoded: bytes) -> tuple[int, int]:
-    """Walk the segments of a JPEG (ITU T.81 annex B) to its scan; return (width, height)."""
-    size: tuple[int, int] | None = None
-    at = len(_JPEG_START)
-    while at + 4 <= len(encoded):
-        if encoded[at] != 0xFF:
-            raise _damaged('jpeg', encoded)
-        marker = encoded[at + 1]
-        if marker == 0xFF or marker in _WITHOUT_LENGTH:
-            at += 1 if marker == 0xFF else 2
-            continue
-        if marker in _START_OF_FRAME and at + 9 <= len(encoded):
-            height, width = struct.unpack_from('>HH', encoded, at + 5)
-            size = (width, height)
-        if marker == _START_OF_SCAN:
-            # In the entropy-coded data 0xFF is always stuffed, so this is the true end.
-            if size is None or encoded.find(_JPEG_END, at) < 0:
-                break
-            return size
-        at += 2 + int(struct.unpack_from('>H', encoded, at + 2)[0])
-    raise _truncated('JPEG', encoded)
-
-
-def _png_size(encoded: bytes) -> tuple[int, int]:
-    """Return (width, height) of a PNG's header when its end is there too."""
-    if len(encoded) < _PNG_HEADER_BYTES or b'IEND' not in encoded[-64:]:
-        raise _truncated('PNG', encoded)
-    width, height = struct.unpack_from('>II', encoded, 16)
-    return width, height

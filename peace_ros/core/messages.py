@@ -64,7 +64,7 @@ def depth_from_image(message: Any) -> DepthImage:
     if message.width < 1 or message.step < row_bytes or len(message.data) != size:
         raise ImageError(
             f'depth image {message.width} x {message.height}, {message.step} bytes per row: '
-            f'{len(message.data)} bytes came, {size} fit'
+            f'{len(message.data)} bytes in place of {size}'
         )
     rows = np.frombuffer(bytes(message.data), np.uint8).reshape(message.height, message.step)
     order = '>f4' if message.is_bigendian else '<f4'

@@ -52,7 +52,7 @@ class SegmentationOptions:
     prompt_timeout: float = parameter(
         0.3,
         'A frame waits this long for the prompt made from it, then takes the newest one; after '
-        'a frame in vain none waits until a prompt is in time again',
+        'a timeout no frame waits until a prompt is in time again',
         unit='s',
         low=0.0,
         high=10.0,
@@ -107,7 +107,7 @@ class LandingOptions:
         25.0, 'Rate of decisions, on the steady clock', unit='Hz', low=20.0, high=400.0
     )
     auto_engage: bool = parameter(
-        False, 'Engage as soon as nothing speaks against it, once; otherwise ~/engage is called'
+        False, 'Engage once, as soon as nothing prevents it; otherwise ~/engage is called'
     )
     registration: bool = parameter(
         False,

@@ -66,7 +66,7 @@ class Pipeline:
         Args:
             preset: the name of a shipped one (``peace_cs``), or a ROS parameter file.
             threads: CPU threads of the networks; 0 takes what the preset says.
-            log: is told what the networks take, and which terms they cannot see.
+            log: gets a line about each model and a warning for each term that it cannot see.
 
         Raises:
             PeaceError: the preset, its terms, vocabularies or bundles cannot be used.
@@ -78,7 +78,7 @@ class Pipeline:
         return cls(segmenter, create_generator(prompting, log))
 
     def segment(self, image_rgb: NDArray[np.uint8]) -> Heatmap:
-        """Return the heatmap of one picture on its own; a sequence of frames begins anew after it.
+        """Return the heatmap of one picture on its own; a new sequence of frames begins after it.
 
         Args:
             image_rgb: height x width x 3.
@@ -145,7 +145,7 @@ def create_generator(parameters: PromptingParameters, log: Log = _LOG) -> Prompt
 
     Args:
         parameters: of the prompts.
-        log: is told what the networks run on and take.
+        log: gets a line about the model.
 
     Raises:
         PeaceError: vocabularies or bundle cannot be used.

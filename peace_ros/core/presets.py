@@ -111,7 +111,7 @@ def load_preset(name_or_path: Path | str = DEFAULT_PRESET) -> Preset:
     """Read a shipped preset by name (``peace_cs``, also written ``PEACE-CS``) or a file by path.
 
     Raises:
-        ConfigurationError: there is none, it is no ROS parameter file, or a node would refuse it.
+        ConfigurationError: it does not exist, is not a parameter file, or a node would refuse it.
 
     """
     path = Path(name_or_path)
@@ -132,7 +132,7 @@ def _presets_dir() -> Path:
 
 
 def _node_of(section: str) -> str:
-    """Return the node that a section is for; a namespace is none of ours."""
+    """Return the node that a section is for; one in a namespace is not known here."""
     return section.removeprefix('/**').removeprefix('/')
 
 

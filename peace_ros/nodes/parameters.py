@@ -65,7 +65,7 @@ def declare_parameters(node: Node, parameters: type[_Parameters], group: str = '
 
 
 def refuse_unknown(node: Node, *groups: Group) -> None:
-    """Refuse values for parameters that nobody declares; those for every node may be of others.
+    """Refuse values of unknown parameters; sections for all nodes may hold those of other nodes.
 
     Raises:
         ConfigurationError: a parameter is unknown.

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Prompts wait here for the frames that they were made from."""
+"""Prompts are kept here for the frames that they were made from."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class PromptBoard:
         self._asked_ns = self._longest_ns = 0
 
     def put(self, prompt: Prompt) -> None:
-        """Add a prompt; the oldest ones are forgotten. One that is in time is waited for again."""
+        """Add a prompt; the oldest ones are dropped. After one in time, frames wait again."""
         with self._changed:
             if self._asked_ns - prompt.stamp_ns <= self._longest_ns:
                 self._in_vain = False
@@ -35,14 +35,14 @@ class PromptBoard:
             self._changed.notify_all()
 
     def close(self) -> None:
-        """Let everybody who waits go."""
+        """Release all waiting callers."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
     @property
     def is_empty(self) -> bool:
-        """No prompt has come yet."""
+        """No prompt has arrived yet."""
         with self._changed:
             return not self._prompts
 
@@ -50,9 +50,9 @@ class PromptBoard:
         """Return the prompt made from the frame of that stamp, else the newest there is.
 
         Waits for it at most the timeout (steady clock), and not at all once a prompt of a later
-        frame is there: the generator has then passed this frame over. Nor does it wait when the
-        frame before did in vain: a generator that is gone must not make every heatmap late. None
-        before the first prompt.
+        frame is there: the generator has then skipped this frame. Nor does it wait when the frame
+        before timed out: a generator that has stopped must not delay every heatmap. None before
+        the first prompt.
         """
         with self._changed:
             self._asked_ns, self._longest_ns = stamp_ns, round(timeout_s * 1e9)

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The quality-of-service profiles, by what flows through them.
 
-Images are keep-last 1: a slow model loses frames and never gathers latency. We offer images
-reliably and ask for them best-effort, which matches every camera driver. Fast DDS loses
+Images are keep-last 1: a slow model loses frames and adds no latency. We offer images
+reliably and request them best-effort, which matches every camera driver. Fast DDS loses
 best-effort images larger than its shared-memory segment (about 549 kB); ``config/fastdds.xml``
 enlarges the segment of the process that publishes them.
 """
@@ -26,7 +26,7 @@ POSE = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=20, reliability=Reliabi
 POSE_IN = QoSProfile(
     history=HistoryPolicy.KEEP_LAST, depth=20, reliability=ReliabilityPolicy.BEST_EFFORT
 )
-"""Poses that we take, from whoever offers them."""
+"""Poses that we subscribe to, whatever reliability they are offered with."""
 
 RESULT = QoSProfile(
     history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.RELIABLE

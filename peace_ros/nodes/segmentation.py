@@ -82,7 +82,10 @@ class SegmentationNode(PeaceNode):
 
     def _on_image(self, message: ImageMessage) -> None:
         if self._static is None and self._board.is_empty:
-            self.say('waiting', 'frames come but no prompt yet: is prompt_generator running?')
+            self.say(
+                'waiting',
+                'no prompt has arrived yet, but frames have: is prompt_generator running?',
+            )
             return
         self._worker.offer(message)
 
@@ -92,7 +95,7 @@ class SegmentationNode(PeaceNode):
         except PeaceError as error:
             self._complain(error)
             return
-        # A new sentence is put into numbers beside the frames, which go on with the last one.
+        # A new sentence is embedded in another thread; frames use the last one until then.
         if prompt.template in self._prepared:
             self._board.put(prompt)
         else:
@@ -139,7 +142,7 @@ class SegmentationNode(PeaceNode):
                 f'no prompt for this frame within {self._options.prompt_timeout} s: using the one '
                 f'made {age_s:.2f} s before it'
                 if age_s > 0.0
-                else f'the prompt generator passed this frame over: using the prompt made '
+                else f'the prompt generator skipped this frame: using the prompt made '
                 f'{-age_s:.2f} s after it'
             )
             self.say('prompt', sentence)

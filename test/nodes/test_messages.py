@@ -99,7 +99,7 @@ def test_a_depth_image_of_millimetres_or_with_bytes_missing_is_refused():
         readers.depth_from_image(millimetres)
     cut = depth_message(np.ones((2, 2), np.float32))
     cut.data = cut.data[:8]
-    with pytest.raises(ImageError, match='8 bytes came, 16 fit'):
+    with pytest.raises(ImageError, match='8 bytes in place of 16'):
         readers.depth_from_image(cut)
 
 

@@ -41,7 +41,7 @@ class Bundle:
         """Load from a folder, or by name: the bundles of the package, then the user's own.
 
         Raises BundleError that names the file, what is wrong with it and what to do. The graphs
-        are held against their family's tensors when a session opens them.
+        are compared with the tensors of their family when a session opens them.
         """
         folder = _find(path_or_name)
         manifest_path = folder / MANIFEST_NAME

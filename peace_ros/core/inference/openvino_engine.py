@@ -27,7 +27,7 @@ Signature = tuple[str, str, tuple[int | None, ...]]
 class OpenVinoEngine:
     """One graph, compiled for each set of outputs and shapes that is asked for.
 
-    What leads only to other outputs is cut away, and fixed shapes let OpenVINO plan its memory
+    Nodes that other outputs need are removed, and fixed shapes let OpenVINO plan its memory
     once; the first run of a new kind therefore takes seconds.
     """
 

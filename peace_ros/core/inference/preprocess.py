@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+from PIL import Image
 
 from peace_ros.core.domain import ImageError
-from peace_ros.core.inference import resample
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,7 +18,11 @@ if TYPE_CHECKING:
     from peace_ros.core.inference.manifest import InputSpec
 
 MAX_PIXELS = 64_000_000
-"""Larger images are refused: they are no camera frames, and reading them would starve the rest."""
+"""Larger images are refused: cameras do not take them, and they would stall everything else."""
+_FILTERS = {
+    'bilinear': Image.Resampling.BILINEAR,
+    'bicubic': Image.Resampling.BICUBIC,
+}
 
 
 class Preprocessor:
@@ -82,7 +86,8 @@ class Preprocessor:
             height, width = (height, longer) if image.shape[0] <= image.shape[1] else (
                 longer, width
             )  # fmt: skip
-        resized = resample.resize(image, width, height, spec.interpolation)
+        scaled = Image.fromarray(image).resize((width, height), _FILTERS[spec.interpolation])
+        resized = np.asarray(scaled)
         top, left = (height - spec.height) // 2, (width - spec.width) // 2
         return resized[top : top + spec.height, left : left + spec.width]
 

@@ -3,7 +3,7 @@
 """Execution providers: which there are, what each needs, and the options it gets.
 
 CPU and OpenVINO are tested; the options for CUDA and TensorRT follow ONNX Runtime's documentation
-and have not been run, for want of such a machine.
+and have not been run on such a machine.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def check_providers(providers: Sequence[str]) -> None:
 
 @dataclass(frozen=True)
 class Footprint:
-    """What a bundle's networks take on their provider, measured when they were loaded."""
+    """Memory and time that a bundle's networks need, measured when they were loaded."""
 
     bundle: str
     precision: str
@@ -93,7 +93,7 @@ class Footprint:
 
 
 class LoadMeter:
-    """Measures what loading takes, from its making on; other loading beside it would count too."""
+    """Measures memory and time from its creation; other loading at the same time counts too."""
 
     def __init__(self) -> None:
         self._began_s, self._before_mb = time.perf_counter(), resident_mb()

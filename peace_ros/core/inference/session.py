@@ -38,7 +38,7 @@ OPTIMISATIONS = MappingProxyType(
 
 _HINDER_INT8 = ('MatMulAddFusion', 'CommonSubexpressionElimination')
 """Optimisations that leave a quantised product nothing to be fused with: it runs in fp32 then,
-three times as slow, its weights unpacked anew for every frame."""
+three times as slow, its weights unpacked again for every frame."""
 
 # ONNX Runtime's errors have no common base of their own.
 _ORT_ERRORS: tuple[type[Exception], ...] = (
@@ -76,7 +76,7 @@ class Session:
 
         Raises:
             ConfigurationError: a provider is not installed or none of them starts.
-            BundleError: the file is no graph that ONNX Runtime can run.
+            BundleError: ONNX Runtime cannot run the file.
         """
         check_providers(providers)
         if providers[0] == OPENVINO:
@@ -163,7 +163,7 @@ def _options(threads: int, optimisation: str) -> ort.SessionOptions:
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.add_session_config_entry('session.intra_op.allow_spinning', '0')
-    options.log_severity_level = 3  # errors: warnings about unused initialisers help nobody
+    options.log_severity_level = 3  # errors: warnings about unused initialisers are of no use
     return options
 
 

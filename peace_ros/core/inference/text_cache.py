@@ -29,8 +29,8 @@ class TextCache:
     """Keeps embeddings in memory and, given a folder, on disk for the next process.
 
     A file holds the text beside its embedding, and the zip container's CRC is checked on
-    reading: a damaged file is as good as none. The cache never stops the work: a folder that
-    cannot be written is reported once, and memory goes on.
+    reading: a damaged file is ignored. The cache never stops the work: when a folder cannot
+    be written, that is reported once, and embeddings are kept in memory only.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class TextCache:
             checksum: of the bundle; embeddings of another model are never returned.
             width: D, length of an embedding.
             folder: where files go, below a folder of the checksum; None keeps memory only.
-            most_in_memory: number of texts; the one unused for longest goes first.
+            most_in_memory: number of texts; the one that was unused for longest is dropped first.
         """
         self._width = width
         self._folder = None if folder is None else folder / checksum[:32]
@@ -94,11 +94,11 @@ class TextCache:
         except FileNotFoundError:
             return None
         except _DAMAGE as error:
-            _LOG.warning('text cache file %s is damaged (%s): computed anew', path, error)
+            _LOG.warning('text cache file %s is damaged (%s): computed again', path, error)
             return None
         fits = embedding.shape == (self._width,) and embedding.dtype == np.float32
         if not (same_text and fits and np.isfinite(embedding).all()):
-            _LOG.warning('text cache file %s is not for %r: computed anew', path, text)
+            _LOG.warning('text cache file %s is not for %r: computed again', path, text)
             return None
         return np.asarray(embedding, np.float32)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Text -> token numbers, with word of what was cut off or is unknown to the model."""
+"""Text -> token numbers; says what was cut off, and which words the model does not know."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Tokenizer:
     """The bundle's tokenizer.json."""
 
     def __init__(self, path: Path, context_length: int) -> None:
-        """Read the file; raises BundleError when it is no tokenizer."""
+        """Read the file; raises BundleError when it is not a tokenizer."""
         try:
             self._tokenizer = tokenizers.Tokenizer.from_file(str(path))
         except Exception as error:  # the library raises the base class and nothing narrower

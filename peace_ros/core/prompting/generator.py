@@ -112,7 +112,7 @@ class _Category:
         return scores
 
     def choose(self, scores: NDArray[np.float32], margin: float) -> list[str]:
-        """Return the words to use; one in use stays until another leads it by the margin."""
+        """Return the words to use; one in use stays until another is ahead by the margin."""
         held = scores.astype(np.float64)
         held[self._chosen] += margin
         best = [int(index) for index in np.argsort(-held, kind='stable')[: self._count]]

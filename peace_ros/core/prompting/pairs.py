@@ -30,7 +30,7 @@ def prompt_from_pairs(pairs: Mapping[str, str], stamp_ns: int) -> Prompt:
     """Return the prompt of its pairs, made from the frame with that stamp.
 
     Raises:
-        ConfigurationError: there is no template, or a score is no number.
+        ConfigurationError: there is no template, or a score is not a number.
 
     """
     if not pairs.get(_TEMPLATE):

@@ -1,9 +1,9 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Frames that no working camera gives: of one colour, blown out, or of another shape than before.
+"""Frames that no working camera takes: of one colour, overexposed, or of another shape than before.
 
-A network has an answer to any picture, also to a covered lens. These are refused before it is
-asked, so that there is no heatmap and the landing holds for want of one.
+A network has an answer to any picture, also to that of a covered lens. Such pictures are refused
+before it runs, so that there is no heatmap, and the landing holds because it has none.
 """
 
 from __future__ import annotations
@@ -57,5 +57,5 @@ class CameraWatch:
         elif abs(aspect / self._aspect - 1.0) > _ASPECT_TOLERANCE:
             raise ImageError(
                 f'the picture is {width} x {height}, its sides {aspect:.2f} : 1 where the camera '
-                f'began with {self._aspect:.2f} : 1: set the camera back or start the node again'
+                f'began with {self._aspect:.2f} : 1: restore the camera or restart the node'
             )

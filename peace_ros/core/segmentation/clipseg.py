@@ -156,7 +156,7 @@ class ClipSegSegmenter(BundleSegmenter):
         return feeds
 
     def _checked(self, scores: Scores) -> Scores:
-        """Return scores h x w clipped to 0..1; refuse what is no score at all."""
+        """Return scores h x w clipped to 0..1; refuse values that cannot be scores."""
         if scores.ndim != 2 or scores.size == 0:
             raise self._unusable('decoder', f'scores of shape {scores.shape}')
         low, high = float(scores.min()), float(scores.max())

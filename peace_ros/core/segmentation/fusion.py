@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From what speaks for and against landing to one safety score per pixel."""
+"""From scores for and against landing to one safety score per pixel."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def softmax_positive(score: Array) -> Array:
 def calibrated(safety: Array, threshold: float) -> Array:
     """Return scores in which 0.5 stands where the threshold stood.
 
-    A shift in log-odds: 0, 1 and the order of scores stay. Whoever reads a heatmap then needs
-    not know which model made it.
+    A shift in log-odds: 0, 1 and the order of scores stay. A reader of the heatmap then
+    does not need to know which model made it.
 
     Args:
         safety: h x w float32, 0 to 1.

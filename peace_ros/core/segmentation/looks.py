@@ -3,8 +3,8 @@
 """A frame of more pixels than the network takes: seen whole, and closer in parts.
 
 From 100 m a person is one pixel of a frame that was shrunk to 352 x 352, and three of the camera's.
-So the frame is also cut into parts, which the network sees as sharp as the camera does; the whole
-tells what the parts belong to.
+So the frame is also cut into parts, which the network sees at the resolution of the camera; the
+whole frame shows what the parts belong to.
 """
 
 from __future__ import annotations

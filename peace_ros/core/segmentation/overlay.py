@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _SAFE_RGB = np.array([40, 220, 60], np.float32)
 _UNSAFE_RGB = np.array([230, 40, 40], np.float32)
 _TINT = 0.45
-"""Share of the tint where the score is sure; little enough to still see what lies below."""
+"""Share of the tint where the score is 0 or 1; the picture below stays visible."""
 
 
 def draw_overlay(frame: Frame, heatmap: Heatmap, threshold: float = 0.5) -> NDArray[np.uint8]:

@@ -51,7 +51,7 @@ def family_of(parameters: SegmentationParameters) -> Family:
     """Return the family that is chosen.
 
     Raises:
-        ConfigurationError: there is none of that name.
+        ConfigurationError: it does not exist.
     """
     family = FAMILIES.get(parameters.family)
     if family is None:
@@ -77,7 +77,7 @@ def create_segmenter(
         own: of the family; None: as they are declared.
         bundle: in place of the one that the parameters name.
         terms: likewise.
-        log: is told.
+        log: gets a line about the model and a warning for each such term.
 
     Raises:
         ConfigurationError: the family is unknown or the parameters do not fit it.

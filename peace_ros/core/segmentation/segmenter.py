@@ -53,7 +53,7 @@ class SegmentationParameters:
 
 
 class Segmenter(Protocol):
-    """Frame + Prompt -> Heatmap; whoever inherits from it needs :attr:`terms` and :meth:`segment`.
+    """Frame + Prompt -> Heatmap; a subclass needs :attr:`terms` and :meth:`segment`.
 
     Models of a family are made with (bundle, terms, parameters, parameters of the family); see
     ``registry.py``.

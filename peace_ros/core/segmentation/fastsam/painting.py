@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which segment speaks for each pixel."""
+"""Which segment decides for each pixel."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from peace_ros.core.segmentation.fastsam.masks import Segment
 from peace_ros.core.segmentation.fastsam.selection import Selection
 
 UNKNOWN = 0
-"""Label of pixels that no scored segment speaks for."""
+"""Label of pixels that no scored segment covers."""
 
 
 def paint(
     selection: Selection, order: Sequence[int], height_px: int, width_px: int
 ) -> NDArray[np.int32]:
-    """Return per pixel 1 + the index of the scored segment that speaks for it, or UNKNOWN.
+    """Return per pixel 1 + the index of the scored segment that decides for it, or UNKNOWN.
 
-    Where segments overlap, the one that comes last in order speaks. Segments that nobody
-    looked at come after all others: below them may be anything.
+    Where segments overlap, the last one in order decides. Segments that were not scored come
+    after all others: what they show is not known.
 
     Args:
         selection: of one frame.

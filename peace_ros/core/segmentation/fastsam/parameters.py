@@ -21,11 +21,12 @@ class FastSamParameters:
         high=300,
     )
     fastsam_min_confidence: float = parameter(
-        0.4, 'Family fastsam: less sure segments do not count', low=0.0, high=1.0
+        0.4, 'Family fastsam: segments of lower confidence are ignored', low=0.0, high=1.0
     )
     fastsam_max_overlap: float = parameter(
         0.9,
-        'Family fastsam: of two boxes with a larger intersection over union the less sure one goes',
+        'Family fastsam: of two boxes with a larger intersection over union, the one of lower '
+        'confidence is dropped',
         low=0.0,
         high=1.0,
     )
@@ -39,13 +40,13 @@ class FastSamParameters:
     fastsam_min_stability: float = parameter(
         0.5,
         "Family fastsam: a segment whose area shrinks below this share of itself when the mask's "
-        'logit moves from 1 below to 1 above its border is noise and does not count',
+        'logit moves from 1 below to 1 above its border is noise and ignored',
         low=0.0,
         high=1.0,
     )
     fastsam_overlap: str = parameter(
         'least_safe',
-        'Family fastsam: which segment speaks for a pixel that several cover, the least_safe or '
+        'Family fastsam: which segment decides for a pixel that several cover, the least_safe or '
         'the smallest one',
         choices=('least_safe', 'smallest'),
     )

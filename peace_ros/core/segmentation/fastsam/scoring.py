@@ -17,7 +17,7 @@ def is_usable(vectors: NDArray[np.float32]) -> bool:
 def term_shares(
     segments: NDArray[np.float32], terms: NDArray[np.float32], logit_scale: float
 ) -> NDArray[np.float32]:
-    """Return how surely each segment shows each term, [N, T] float32; rows sum to 1.
+    """Return how likely each segment shows each term, [N, T] float32; rows sum to 1.
 
     The softmax of the scaled cosine similarities runs over the terms of one segment, as in
     zero-shot classification with CLIP (Radford et al. 2021, figure 3). FastSAM's text prompt runs
