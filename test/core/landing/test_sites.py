@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from peace_ros.core.domain import Pose, Site
 from peace_ros.core.landing import SAFETY_THRESHOLD_FLOOR, Focus, LandingParameters, VerdictKind
+from peace_ros.core.landing.memory import FailedPlace
 from peace_ros.core.landing.sites import Search, clearance, find_site, safe_ground
 from peace_ros.core.mapping import MapLayers
 
@@ -138,7 +139,7 @@ def test_looks_only_within_the_focus():
 def test_places_that_failed_are_left_out():
     layers = layers_with((0.0, 0.0, 6.5), (35.0, 0.0, 6.5))
     assert abs(find_site(layers, SEARCH, P).site.north_m) < 3.0
-    again = find_site(layers, replace(SEARCH, failed=((0.0, 0.0, 8.0),)), P).site
+    again = find_site(layers, replace(SEARCH, failed=(FailedPlace(0.0, 0.0, 8.0, 0),)), P).site
     assert again.north_m > 30.0
 
 
