@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from math import atan2, cos, sin
+from math import acos, atan2, cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,11 @@ def rotation_matrix(q: Quaternion) -> NDArray[np.float64]:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def angle_between(a: Quaternion, b: Quaternion) -> float:
+    """Return the angle in radians, 0 to pi, of the rotation from one attitude to the other."""
+    return 2.0 * acos(min(1.0, abs(sum(one * other for one, other in zip(a, b, strict=True)))))
 
 
 def slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:

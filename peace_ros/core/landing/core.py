@@ -1,8 +1,8 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The landing in one object: poses, heatmaps and telemetry in, decisions out; no clock, no thread.
+"""The landing as one object: poses, heatmaps and telemetry in, decisions out; no clock, no thread.
 
-The order of a step is that of responsibility: data, site, state, guidance, guard.
+Each step handles data, site, state, guidance and guard, in this order.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from peace_ros.core.landing.watch import valid_pose
 from peace_ros.core.mapping import MapParameters, SafetyMap
 
 _JUMP_NS = 1_000_000_000
-"""A clock that goes back by more than this has begun anew."""
+"""A clock that goes back by more than this was restarted."""
 
 
 class LandingCore:
-    """Brings a vehicle down over safe ground; not thread-safe.
+    """Lands a vehicle on safe ground; not thread-safe.
 
-    Times are nanoseconds of one clock, that of the stamps of poses and heatmaps.
+    Times are nanoseconds of one clock, the clock of the stamps of poses and heatmaps.
     """
 
     def __init__(
@@ -49,19 +49,19 @@ class LandingCore:
         return self._helm.state
 
     def add_pose(self, pose: Pose) -> None:
-        """Keep a pose for the heatmaps of its time; poses come in the order of their stamps."""
+        """Keep a pose for the heatmaps around its stamp; in the order of stamps."""
         self._intake.add_pose(pose)
 
     def add_heatmap(self, heatmap: Heatmap) -> None:
-        """Put a heatmap into the map with the pose at its stamp, or count why not."""
+        """Put a heatmap into the map with the pose at its stamp, or count the reason why not."""
         self._intake.add_heatmap(heatmap)
 
     def add_depth(self, depth: DepthImage) -> None:
-        """Let a depth image close ground that is not flat; optional, and it opens nothing."""
+        """Close ground that a depth image shows not flat; optional, and it opens nothing."""
         self._intake.add_depth(depth)
 
     def add_view(self, frame: Frame) -> None:
-        """Keep the picture of a frame, which carries the map on while no position is known."""
+        """Keep the picture of a frame, for the position while the autopilot has none."""
         self._intake.add_view(frame)
 
     def engage(self) -> None:
@@ -70,7 +70,7 @@ class LandingCore:
         self._helm.engage()
 
     def disengage(self) -> None:
-        """Stop: the set-point is zero and the state IDLE from the next step on."""
+        """Stop: zero velocity and IDLE from the next step on."""
         self._helm.disengage()
 
     def step(self, now_ns: int, telemetry: Telemetry | None, telemetry_age_s: float) -> Decision:
@@ -101,7 +101,7 @@ class LandingCore:
         )
 
     def _keep_time(self, now_ns: int) -> None:
-        """A clock that jumps back (a simulation begun anew) makes everything known worthless."""
+        """Forget everything when the clock jumps back (a restarted simulation)."""
         if self._last_ns is not None and now_ns < self._last_ns - _JUMP_NS:
             self.safety_map.clear()
             self._intake.clear()

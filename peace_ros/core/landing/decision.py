@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a step of the landing answers."""
+"""Result of one step of the landing."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ class Focus:
 
 @dataclass(frozen=True)
 class Decision:
-    """Everything that one step decided, for the vehicle, the status topic and the display."""
+    """Result of one step, for the vehicle, the status topic and the display."""
 
     state: State
     reason: str
-    """Why the state is what it is, and what motion waits for."""
+    """Why the landing is in this state, and what motion waits for."""
     setpoint: Setpoint
-    """Guarded: this is what may be sent."""
+    """After the guard: this may be sent."""
     verdict: Verdict
     effective_threshold: float
     """Safety score from which ground counts as safe now."""
@@ -66,18 +66,18 @@ class Decision:
     focus: Focus | None
     """None while no position is known."""
     guard_notes: tuple[str, ...] = ()
-    """Which limits made the motion smaller."""
+    """Limits that made the motion smaller."""
     counts: Mapping[str, int] = field(default_factory=dict)
-    """Heatmaps by fate: used, or the reason of the rejection."""
+    """Heatmaps by result: used, or the reason of the rejection."""
     outcome: str | None = None
     """`handover`, `no_zone`, `timeout`, `battery` or `aborted` once it is over."""
     time_in_state_s: float = 0.0
     failed_sites: int = 0
-    """Places that are left out because they failed."""
+    """Places that are excluded because they failed."""
     attempts: int = 0
     """Descents that failed."""
     relaxed: bool = False
-    """The threshold has sunk below its parameter, which only the parameter relaxation allows."""
+    """The threshold has sunk below safety_threshold, which only relaxation allows."""
 
     @property
     def site(self) -> Site | None:

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Velocity set-points of each state: towards the site, down over it, never across the unknown."""
+"""Velocity set-points of each state: towards the site, then down over it."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from peace_ros.core.landing.states import STILL_STATES, State
 from peace_ros.core.landing.watch import at_safe_altitude
 
 _FLOOR_GAIN = 0.6
-"""1/s; descending at this rate of the remaining height, the autopilot's second of delay
-(0.7 m beyond at 1 m/s) is used up before the floor."""
+"""1/s: descent speed per metre of height left. The autopilot, which overshoots by 0.7 m at 1 m/s,
+stops above the floor with it."""
 _CREEP_M_S = 0.3
 _HIGHEST_SEARCH_M = 120.0
 _Wish = tuple[tuple[float, float, float], str]
@@ -24,14 +24,14 @@ _STAND = (0.0, 0.0, 0.0)
 
 
 def over_site(pose: Pose, site: Site, radius_m: float) -> bool:
-    """Tell whether the vehicle and its radius lie within the clearance of the site."""
+    """Return whether the vehicle and its radius lie within the clearance of the site."""
     return site.distance_m(pose) + radius_m <= site.clearance_m
 
 
 def velocity(
     state: State, situation: Situation, parameters: LandingParameters
 ) -> tuple[Setpoint, str]:
-    """Return the wished set-point and what motion waits for (empty when for nothing)."""
+    """Return the set-point before the guard, and what motion waits for (empty: nothing)."""
     stamp_ns, fly = situation.sighting.stamp_ns, _FLIGHTS.get(state)
     if situation.pose is None or fly is None or state in STILL_STATES:
         return Setpoint(stamp_ns), ''
@@ -164,11 +164,11 @@ _FLIGHTS: dict[State, Callable[[Pose, Situation, LandingParameters], _Wish]] = {
     State.RESTARTING: _search,
     State.RETURNING: _return,
 }
-"""States that move; every other one stands still."""
+"""States that move; in every other one the vehicle hovers."""
 
 
 class ExpandingSquare:
-    """Way-points of an expanding square (IAMSAR), clockwise from north, begun anew at its limit."""
+    """Way-points of an expanding square (IAMSAR), clockwise from north; restarts at its limit."""
 
     _ARRIVED_M = 5.0
     _TURNS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))

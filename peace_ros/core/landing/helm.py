@@ -1,9 +1,8 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From what is known to what is flown: events, state, guidance, guard; knows no map.
+"""From a sighting and telemetry to a decision: events, state, guidance, guard; without the map.
 
-Everything between a sighting and a set-point is here, so that tests can put any sequence of
-sightings and telemetry before it.
+Tests can give it any sequence of sightings and telemetry.
 """
 
 from __future__ import annotations
@@ -29,11 +28,11 @@ from peace_ros.core.landing.watch import (
 
 _NS = 1e-9
 _AIMED_M = 1.0
-"""AIMING has descended enough this close to its floor."""
+"""AIMING ends this close to its floor."""
 _HOME_M = 3.0
-"""RETURNING has arrived within this."""
+"""RETURNING ends within this distance."""
 _FENCE_MARGIN_M = 5.0
-"""The search turns this far before the fence."""
+"""The search turns back this far before the fence."""
 
 
 class Helm:
@@ -58,7 +57,7 @@ class Helm:
 
     @classmethod
     def engaged_in(cls, parameters: LandingParameters, state: State) -> Helm:
-        """Build one whose engagement has come to a state, for trials that begin in each."""
+        """Build an engaged helm in a given state, for tests that begin in each."""
         helm = cls(parameters)
         helm.engage()
         helm.state, helm._new_engagement = state, False
@@ -71,7 +70,7 @@ class Helm:
         self._begin()
 
     def disengage(self) -> None:
-        """Stop: zero and IDLE from the next step on."""
+        """Stop: zero velocity and IDLE from the next step on."""
         self._engaged = self._new_engagement = False
 
     def restart_clock(self, now_ns: int) -> None:
@@ -89,7 +88,7 @@ class Helm:
 
     @property
     def without_site_s(self) -> float:
-        """How long a site has been looked for in vain."""
+        """How long a site has been searched without success."""
         return self._budget.without_site_s
 
     def decide(

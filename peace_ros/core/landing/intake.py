@@ -1,9 +1,9 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which heatmaps reach the map, and with which pose; and when the map is worthless.
+"""Which heatmaps reach the map, with which pose, and when the map is dropped.
 
-A map rests on where the vehicle was. When the position jumps, or for a while nothing tells it, what
-lies where is not known any more, and the map is dropped rather than guessed.
+The map is built from positions of the vehicle. When the position jumps, or is unknown for a while,
+the map no longer fits the ground and is dropped.
 """
 
 from __future__ import annotations
@@ -37,17 +37,18 @@ class HeatmapIntake:
         self._pending: deque[Heatmap] = deque()
         self._depths: deque[DepthImage] = deque(maxlen=_PENDING_LIMIT)
         self._newest_depth_ns = -1
-        self._waiting_since_ns: dict[int, int] = {}
+        self._waiting = (-1, 0)
+        """Stamp of the heatmap that waits for a pose, and since when (ns)."""
         self._clock_ns: int | None = None
         self.counts: Counter[str] = Counter()
-        """Heatmaps by fate: `used`, or the reason of a rejection."""
+        """Heatmaps by result: `used`, or the reason of a rejection."""
         self._last_rejection = self._drop_reason = ''
         self.drops = 0
-        """How often the map was dropped; what was concluded from it is void then."""
+        """How often the map was dropped; a site chosen from it is no longer valid then."""
 
     @property
     def last_rejection(self) -> str:
-        """Why there is no newer map: why it was dropped, or the last heatmap rejected."""
+        """Why the map is not newer: why it was dropped, or why the last heatmap was rejected."""
         return self._drop_reason or self._last_rejection
 
     def clear(self) -> None:
@@ -57,14 +58,10 @@ class HeatmapIntake:
         self._pending.clear()
         self._depths.clear()
         self._newest_depth_ns = -1
-        self._waiting_since_ns.clear()
         self._clock_ns = None
 
     def add_pose(self, pose: Pose) -> None:
-        """Keep a pose and use the heatmaps that waited for it.
-
-        While north and east are NaN only attitude and altitude are known.
-        """
+        """Keep a pose, north and east NaN where unknown, and use the heatmaps that wait for it."""
         if not pose.has_position:
             kept = self._carrier.add_pose(pose)
         else:
@@ -79,7 +76,7 @@ class HeatmapIntake:
         self._settle()
 
     def add_view(self, frame: Frame) -> None:
-        """Keep the picture of a frame, so that it can stand in for the position."""
+        """Keep the picture of a frame, from which the position is estimated when it is unknown."""
         if self._carrier.add_view(frame):
             self._settle()
 
@@ -88,7 +85,7 @@ class HeatmapIntake:
         if jumped_m == 0.0:
             return
         self._drop_map(f'the position jumped by {jumped_m:.1f} m')
-        # Heatmaps still on their way belong to the frame of before.
+        # The poses of before the jump are in another frame.
         self._poses.clear()
         self._poses.add(pose)
 
@@ -113,11 +110,12 @@ class HeatmapIntake:
         else:
             self._pending.append(heatmap)
             if len(self._pending) > _PENDING_LIMIT:
-                self._drop('overtaken while it waited for a pose')
+                self._pending.popleft()
+                self._reject('overtaken while it waited for a pose')
             self._settle()
 
     def add_depth(self, depth: DepthImage) -> None:
-        """Use a depth image, or let it wait for its pose; the oldest waits in vain."""
+        """Use a depth image, or let it wait for its pose; when too many wait the oldest is lost."""
         if depth.stamp_ns <= self._newest_depth_ns:
             self.counts['depth not newer than the last'] += 1
             return
@@ -126,17 +124,20 @@ class HeatmapIntake:
         self._settle()
 
     def tick(self, now_ns: int) -> None:
-        """Tell the time: heatmaps that have waited too long, or that lie ahead, are rejected."""
+        """Set the time: heatmaps that waited too long or have a future stamp are rejected."""
         self._clock_ns = now_ns
         limit_ns = round(self._p.pose_wait_limit_s * 1e9)
         while self._pending and self._is_future(self._pending[-1], now_ns):
-            self._forget_wait(self._pending.pop())
+            self._pending.pop()
             self._reject('stamp in the future')
         while self._pending:
-            since_ns = self._waiting_since_ns.setdefault(self._pending[0].stamp_ns, now_ns)
-            if now_ns - since_ns <= limit_ns:
+            stamp_ns = self._pending[0].stamp_ns
+            if self._waiting[0] != stamp_ns:
+                self._waiting = (stamp_ns, now_ns)
+            if now_ns - self._waiting[1] <= limit_ns:
                 break
-            self._drop(Miss.NOT_YET.value)
+            self._pending.popleft()
+            self._reject(Miss.NOT_YET.value)
         self._watch_position(now_ns)
 
     def _watch_position(self, now_ns: int) -> None:
@@ -153,7 +154,7 @@ class HeatmapIntake:
         pose = self._poses.at(stamp_ns)
         if not self._carrier.is_carrying:
             return pose
-        # A position that has come back counts once pictures have confirmed it.
+        # A position that has come back is used only after pictures have confirmed it.
         before_gap = isinstance(pose, Pose) and stamp_ns < (self._carrier.newest_ns or 0)
         return pose if before_gap else self._carrier.at(stamp_ns)
 
@@ -167,24 +168,27 @@ class HeatmapIntake:
             pose = self._pose_at(self._pending[0].stamp_ns)
             if pose is Miss.NOT_YET:
                 return
-            if isinstance(pose, Miss):
-                self._drop(pose.value)
-                continue
-            heatmap = self._pending.popleft()
-            self._forget_wait(heatmap)
-            problem = self._pictures.problem(heatmap, pose)
+            problem = self._use(self._pending.popleft(), pose)
             if problem:
                 self._reject(problem)
-                continue
-            try:
-                self._map.add(heatmap, self._camera, pose)
-            except ImageError:
-                self._reject('values outside of 0 to 1')
-            except RefusedLookError as refusal:
-                self._reject(refusal.fate)
             else:
                 self.counts['used'] += 1
                 self._drop_reason = ''
+
+    def _use(self, heatmap: Heatmap, pose: Pose | Miss) -> str:
+        """Put a heatmap into the map; return why it is rejected, empty when it is used."""
+        if isinstance(pose, Miss):
+            return pose.value
+        problem = self._pictures.problem(heatmap, pose)
+        if problem:
+            return problem
+        try:
+            self._map.add(heatmap, self._camera, pose)
+        except ImageError:
+            return 'values outside of 0 to 1'
+        except RefusedLookError as refusal:
+            return refusal.fate
+        return ''
 
     def _settle_depths(self) -> None:
         while self._depths:
@@ -201,13 +205,6 @@ class HeatmapIntake:
                 except RefusedLookError as refusal:
                     fate = f'depth {refusal.fate}'
             self.counts[fate] += 1
-
-    def _drop(self, reason: str) -> None:
-        self._forget_wait(self._pending.popleft())
-        self._reject(reason)
-
-    def _forget_wait(self, heatmap: Heatmap) -> None:
-        self._waiting_since_ns.pop(heatmap.stamp_ns, None)
 
     def _reject(self, reason: str) -> None:
         self.counts[reason] += 1

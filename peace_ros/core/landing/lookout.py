@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the map says at a moment: verdict, focus, threshold, and the ground under the vehicle."""
+"""Judges the map in each step: verdict, focus, threshold, and the ground under the vehicle."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from peace_ros.core.mapping import MapLayers, SafetyMap
 
 _NS = 1e-9
 _RENEW_S = 0.5
-"""Without a new heatmap the map is judged again after this, because it ages."""
+"""Without a new heatmap the map is judged again after this time, because it ages."""
 
 
 class Lookout:
-    """Judges the map for the state that the landing is in, and remembers what failed."""
+    """Judges the map for the state of the landing, and remembers which sites failed."""
 
     def __init__(self, parameters: LandingParameters, safety_map: SafetyMap) -> None:
         self._p = parameters
@@ -31,7 +31,7 @@ class Lookout:
 
     @property
     def failed_sites(self) -> int:
-        """Number of places that are left out because they failed."""
+        """Number of places that are excluded because they failed."""
         return len(self._memory.failed)
 
     def begin(self) -> None:
@@ -43,7 +43,7 @@ class Lookout:
         self.forget_choice()
 
     def forget_choice(self) -> None:
-        """Forget what was concluded from the map."""
+        """Forget every conclusion from the map."""
         self._verdict = Verdict.no_zone('nothing is known yet')
         self._focus: Focus | None = None
         self._judged = (-1, 0)
@@ -55,14 +55,13 @@ class Lookout:
         Args:
             now_ns: The clock of the heatmaps' stamps.
             pose: Of the vehicle; None while it is not known, and then nothing is judged anew.
-            state: Of the landing; it decides where and how strictly is looked.
-            without_site_s: How long a site has been looked for in vain.
+            state: Of the landing; it decides where to look, and how strictly.
+            without_site_s: How long a site has been searched without success.
         """
         self._memory.forgive(now_ns)
-        if pose is not None:
-            self._judge(now_ns, pose, state, without_site_s)
         score, age_s = 0.0, inf
         if pose is not None:
+            self._judge(now_ns, pose, state, without_site_s)
             score, age_s = self._map.score_around(
                 pose.north_m, pose.east_m, self._p.safety_radius_m, now_ns
             )
@@ -82,7 +81,7 @@ class Lookout:
         )
 
     def follow(self, before: State, state: State, now_ns: int) -> bool:
-        """Take note of a new state; return whether it means that a descent has failed."""
+        """Follow a change of state; return whether it means that a descent has failed."""
         self._judged = (-1, now_ns)
         site, failed_descent = self._verdict.site, False
         if state is State.LANDING and self._anchor is None:
@@ -104,13 +103,11 @@ class Lookout:
         return descended
 
     def reachable(self, pose: Pose | None) -> Site | None:
-        """Return the site of the verdict unless the way to it is not known to be free."""
+        """Return the site of the verdict, None when lateral motion to it may meet an obstacle."""
         site = self._verdict.site
         if site is None or pose is None or at_safe_altitude(pose, self._p):
             return site
         return site if site.distance_m(pose) <= site.clearance_m else None
-
-    # --- judgement
 
     def _judge(self, now_ns: int, pose: Pose, state: State, without_site_s: float) -> None:
         """Renew verdict, focus and threshold when the map has changed or aged."""
@@ -139,15 +136,13 @@ class Lookout:
             threshold=self._threshold,
             required_clearance_m=self._p.required_clearance_m(pose.altitude_agl_m),
             age_limit_s=age_limit_s,
-            failed=tuple(
-                (each.north_m, each.east_m, each.radius_m) for each in self._memory.failed
-            ),
+            failed=self._memory.failed,
             incumbent=self._verdict.site or self._anchor,
         )
         return find_site(layers, search, self._p)
 
     def _moved_focus(self, pose: Pose, state: State, *, is_new: bool) -> Focus:
-        """Narrow the circle of the search step by step, widen it at once."""
+        """Return the new circle of the search: it shrinks in steps and grows at once."""
         p = self._p
         whole_m = self._map.parameters.map_size_m
         radius_m = {
@@ -174,7 +169,7 @@ class Lookout:
     def _choose_threshold(
         self, layers: MapLayers, age_limit_s: float, without_site_s: float
     ) -> None:
-        """Let the threshold sink slowly while nothing is found, if that is allowed at all."""
+        """Lower the threshold slowly while no site is found, where relaxation allows it."""
         p = self._p
         sunk = min(1.0, without_site_s / p.relax_after_s) if p.relaxation else 0.0
         wanted = p.safety_threshold - sunk * (p.safety_threshold - p.relaxed_threshold)
@@ -187,7 +182,7 @@ class Lookout:
         self._threshold = wanted
 
     def anchored(self, verdict: Verdict) -> Verdict:
-        """Below the safe altitude the site may not wander farther than it was wide."""
+        """Return NO_ZONE when the site has moved too far since the descent began."""
         anchor, site = self._anchor, verdict.site
         if anchor is None or site is None:
             return verdict

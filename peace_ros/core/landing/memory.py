@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Places that an engagement remembers: those that failed, and the best of those that did not."""
+"""Places remembered during an engagement: those that failed, and those seen besides."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class FailedPlace:
 
 
 class SiteMemory:
-    """Failures with their radius, which grows where they repeat, and the places seen besides."""
+    """Failed places, whose radius grows where failures repeat, and every other site seen."""
 
     def __init__(self, parameters: LandingParameters) -> None:
         self._p = parameters
@@ -40,34 +40,26 @@ class SiteMemory:
 
     @property
     def failed(self) -> tuple[FailedPlace, ...]:
-        """What is not forgiven yet."""
+        """Places that are excluded now."""
         return tuple(self._failed)
 
     def forgive(self, now_ns: int) -> None:
-        """Drop what is older than the memory lasts."""
+        """Allow the places again whose time is over."""
         self._failed = [each for each in self._failed if each.until_ns > now_ns]
 
     def fail(self, site: Site, now_ns: int) -> FailedPlace:
-        """Remember a failure; one near to others takes their place with a larger radius."""
+        """Exclude a place that failed; where others failed before, with a larger radius."""
         p = self._p
         near = [each for each in self._failed if each.covers(site)]
         failures = 1 + sum(each.failures for each in near)
-        # A field of 50 m is not lost for one person on it; that it failed twice is remembered.
+        # One person on a field of 50 m does not exclude all of it; a second failure excludes more.
         radius_m = max(p.failed_site_radius_m, min(site.clearance_m, p.ample_clearance_m))
-        grown_m = min(
-            p.failed_site_radius_limit_m, radius_m * p.failed_site_growth ** (failures - 1)
-        )
-        place = FailedPlace(
-            site.north_m,
-            site.east_m,
-            max(radius_m, grown_m),
-            now_ns + round(p.failed_site_memory_s * 1e9),
-            failures,
-        )
-        # A larger circle around another middle need not cover the old one: it stays then.
-        covered = [each for each in self._failed if _within(each, place)]
-        self._failed = [each for each in self._failed if each not in covered]
-        self._failed.append(place)
+        grown_m = radius_m * p.failed_site_growth ** (failures - 1)
+        grown_m = max(radius_m, min(p.failed_site_radius_limit_m, grown_m))
+        until_ns = now_ns + round(p.failed_site_memory_s * 1e9)
+        place = FailedPlace(site.north_m, site.east_m, grown_m, until_ns, failures)
+        # An old circle that the new one does not cover stays.
+        self._failed = [each for each in self._failed if not _within(each, place)] + [place]
         return place
 
     def see(self, site: Site) -> None:

@@ -1,9 +1,9 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Position while the autopilot has none: carried on from the last known one by camera pictures.
+"""Position while the autopilot has none: estimated by camera pictures from the last known one.
 
-Every picture is compared with a key picture, which is kept as long as enough of it is in view, so
-that a hovering vehicle does not drift; each change of the key adds its error to what has gathered.
+Each picture is compared with a key picture. The key stays while enough of it is in view, so that
+the estimate of a hovering vehicle does not drift; each new key adds its error.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ _NEW_KEY_DISTANCE = 0.2
 """Of the footprint."""
 _NEW_KEY_ALTITUDE = 1.2
 _LOST_NS = 1_000_000_000
-"""Pictures may fail to tell the position for this long."""
+"""Without a picture that gives the position for this long the map is dropped."""
 _RETURN_M = 3.0
-"""A position that comes back this near to the carried one (and its drift) continues it."""
+"""A position that returns within this distance of the estimate (plus drift) confirms it."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class _Fix:
 
 
 class VisualOdometry:
-    """Follows the vehicle from a known position by pictures; pure."""
+    """Estimates the position by pictures, from a known one on; pure."""
 
     def __init__(self, camera: Camera) -> None:
         self._camera = camera
@@ -46,24 +46,24 @@ class VisualOdometry:
 
     @property
     def is_anchored(self) -> bool:
-        """Whether there is a position to go on from."""
+        """Whether there is a position to start from."""
         return self._key is not None
 
     @property
     def drift_m(self) -> float:
-        """How far the newest position may be off, since the anchor."""
+        """Possible error of the newest position, grown since the anchor."""
         return 0.0 if self._last is None else self._last.drift_m
 
     def clear(self) -> None:
-        """Forget the way."""
+        """Forget every picture."""
         self._key = self._last = None
 
     def anchor(self, view: View) -> None:
-        """Begin anew from a view whose pose holds the true position."""
+        """Start from a view whose pose has the true position."""
         self._key = self._last = _Fix(view, 0.0)
 
     def follow(self, view: View) -> Pose | Mismatch:
-        """Return the pose of a view whose position is not known, or why it cannot be told.
+        """Return the pose of a view whose position is not known, or why there is none.
 
         :raises ValueError: when nothing was anchored.
         """
@@ -99,7 +99,7 @@ class VisualOdometry:
 
 
 class PositionCarrier:
-    """Pairs pictures with attitudes, follows them while there is no position, ages the map."""
+    """Pairs pictures with attitudes, estimates the position while there is none, widens the map."""
 
     def __init__(self, camera: Camera, gap_limit_s: float, safety_map: SafetyMap) -> None:
         self._map = safety_map
@@ -111,7 +111,7 @@ class PositionCarrier:
         self._told_ns = 0
         self._widened_m = 0.0
         self.is_carrying = False
-        """The position of now rests on pictures."""
+        """The present position is estimated by pictures."""
 
     def clear(self) -> None:
         """Forget poses and pictures."""
@@ -120,7 +120,7 @@ class PositionCarrier:
         self.forget_way()
 
     def forget_way(self) -> None:
-        """Forget where pictures led to; the next known position begins anew."""
+        """Forget the estimate; it starts again from the next known position."""
         self._pending.clear()
         self._carried.clear()
         self._odometry.clear()
@@ -128,7 +128,7 @@ class PositionCarrier:
 
     @property
     def newest_ns(self) -> int | None:
-        """Stamp of the newest carried position, None when there is none."""
+        """Stamp of the newest estimated position, None when there is none."""
         newest = self._carried.newest
         return None if newest is None else newest.stamp_ns
 
@@ -146,13 +146,13 @@ class PositionCarrier:
         return True
 
     def at(self, stamp_ns: int) -> Pose | Miss:
-        """Return the carried pose at a stamp, or why there is none."""
+        """Return the estimated pose at a stamp, or why there is none."""
         return self._carried.at(stamp_ns)
 
     def settle(self, positions: PoseHistory) -> str:
-        """Follow the pictures whose attitude is known by now.
+        """Use the pictures whose attitude is known by now.
 
-        :return: why the map is worthless from now on, empty while it is not.
+        :return: why the map must be dropped, empty when it may stay.
         """
         while self._pending:
             stamp_ns, view = self._pending[0]
@@ -180,7 +180,7 @@ class PositionCarrier:
         if isinstance(pose, Mismatch):
             if stamp_ns - self._told_ns <= _LOST_NS:
                 return ''
-            return f'no position, and pictures do not replace it: {pose.value}'
+            return f'no position, and pictures do not give one: {pose.value}'
         self._told_ns = stamp_ns
         self._carried.add(pose)
         self.is_carrying = True
@@ -188,14 +188,14 @@ class PositionCarrier:
         return ''
 
     def _come_back(self, view: View, position: Pose) -> str:
-        """Take a known position; the map stays only when the carried position led there."""
+        """Take a known position; the map stays only when it confirms the estimate."""
         if self.is_carrying:
             carried = self._odometry.follow(view)
             if isinstance(carried, Mismatch):
                 return f'position is back, and pictures do not confirm it: {carried.value}'
             off_m = hypot(carried.north_m - position.north_m, carried.east_m - position.east_m)
             if off_m > _RETURN_M + self._odometry.drift_m:
-                return f'position is back, {off_m:.1f} m from where pictures led'
+                return f'position is back, {off_m:.1f} m from the estimate by pictures'
             self._lose_accuracy(self._widened_m + off_m)
         self._odometry.anchor(View(view.grey, position))
         self._carried.clear()
@@ -205,7 +205,7 @@ class PositionCarrier:
         return ''
 
     def _lose_accuracy(self, drift_m: float) -> None:
-        """Let what is unsafe grow with the drift, a cell at a time."""
+        """Let unsafe ground grow with the drift, in whole cells."""
         cell_m = self._map.parameters.map_cell_m
         cells = int((drift_m - self._widened_m) / cell_m)
         if cells > 0:

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A decision as key/value pairs: what ``landing/status`` says, in flight and in a replay."""
+"""A decision as key/value pairs of ``landing/status``, in flight and in a replay."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def decision_pairs(decision: Decision, pose: Pose | None) -> dict[str, str]:
 
     ``north_m``, ``east_m`` and ``altitude_agl_m`` are those of the pose, ``site_...`` and
     ``focus_...`` those of the decision, all in the local NED frame; ``heatmaps/...`` counts the
-    heatmaps by their fate.
+    heatmaps by result.
     """
     numbers = {
         'effective_threshold': decision.effective_threshold,

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the landing can be told, and the limits that nothing can cross."""
+"""Parameters of the landing, and limits that no configuration can cross."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.domain.parameters import check, parameter
 
 SAFETY_THRESHOLD_FLOOR = 0.65
-"""No configuration lets ground of a lower safety score count as safe; NO_ZONE is an answer."""
+"""No configuration lets ground of a lower safety score count as safe."""
 CELL_SCORE_FLOOR = 0.5
-"""A single cell below this is more likely unsafe than safe and is an obstacle whatever surrounds
-it."""
+"""A cell below this is more likely unsafe than safe: it is an obstacle, whatever surrounds it."""
 
 
 @dataclass(frozen=True)
 class LandingParameters:
-    """Defaults are those of the released DOVESEI where the description says nothing else."""
+    """Defaults are those of the released DOVESEI unless the description says otherwise."""
 
     # Altitudes
     safe_altitude_m: float = parameter(

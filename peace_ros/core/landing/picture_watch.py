@@ -1,22 +1,23 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Heatmaps that cannot be of the ground below, however fresh their stamps are."""
+"""Rejects heatmaps that cannot show the ground below, however fresh their stamps are."""
 
 from __future__ import annotations
 
-from math import acos, dist, radians
+from math import dist, radians
 
 import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import Heatmap, Pose
+from peace_ros.core.domain.geometry import angle_between
 
 STUCK = 'the picture does not change although the vehicle moves'
-EVEN = 'every pixel is called surely safe'
+EVEN = 'every pixel has the highest safety score'
 _MOVED_M = 0.5
 _TURNED_RAD = radians(3.0)
 _SAFE = 0.5
-"""Only what calls something safe can do harm: an unsafe heatmap is believed in any case."""
+"""A heatmap without a value above this calls nothing safe, and is accepted in any case."""
 
 
 class PictureWatch:
@@ -26,15 +27,16 @@ class PictureWatch:
         self._first: tuple[NDArray[np.float32], Pose] | None = None
 
     def problem(self, heatmap: Heatmap, pose: Pose) -> str:
-        """Return why a heatmap cannot be believed, empty when it can.
+        """Return why a heatmap is rejected, empty when it is accepted.
 
         A driver that repeats its last picture with new stamps gives heatmaps that are equal to the
-        last bit; those of a vehicle that hovers in a simulation may be so too, which does no harm.
+        last bit. So may a vehicle that hovers in a simulation: equal heatmaps are rejected only
+        when the vehicle has moved.
         """
         safety = heatmap.safety
         highest = float(safety.max())
         if highest == float(safety.min()):
-            # Of one value there is nothing to compare; surely safe everywhere is no place on earth.
+            # A frozen camera cannot be told from one value; no real scene is safe everywhere.
             return EVEN if highest == 1.0 else ''
         if self._first is None or not np.array_equal(safety, self._first[0]):
             self._first = (safety, pose)
@@ -44,6 +46,5 @@ class PictureWatch:
 
 def _has_moved(before: Pose, after: Pose) -> bool:
     here, there = ((pose.north_m, pose.east_m, pose.altitude_agl_m) for pose in (after, before))
-    one, other = before.quaternion_ned_frd, after.quaternion_ned_frd
-    cosine = abs(sum(a * b for a, b in zip(one, other, strict=True)))
-    return dist(here, there) > _MOVED_M or 2.0 * acos(min(1.0, cosine)) > _TURNED_RAD
+    turned_rad = angle_between(before.quaternion_ned_frd, after.quaternion_ned_frd)
+    return dist(here, there) > _MOVED_M or turned_rad > _TURNED_RAD

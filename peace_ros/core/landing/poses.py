@@ -3,18 +3,18 @@
 """Where the vehicle was when a picture was taken.
 
 Position is interpolated linearly, attitude along the shorter arc; nothing is extrapolated. At the
-30 Hz that the autopilot is asked for, an acceleration of 3 m/s^2 bends the way between two poses by
-less than a millimetre, so velocities would add nothing; across a gap they would hide a guess.
+requested 30 Hz an acceleration of 3 m/s^2 bends the path between two poses by less than a
+millimetre, so velocities would add nothing; across a gap they would hide a guess.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_left
 from enum import Enum
-from math import acos, hypot, isfinite, radians
+from math import hypot, isfinite, radians
 
 from peace_ros.core.domain import Pose
-from peace_ros.core.domain.geometry import interpolate
+from peace_ros.core.domain.geometry import angle_between, interpolate
 
 _MEMORY_NS = 10_000_000_000
 _NS = 1e-9
@@ -37,7 +37,7 @@ class Miss(Enum):
 
 
 def jump_m(before: Pose, after: Pose) -> float:
-    """Return by how many metres the position jumped between two poses, 0 for what can be flown."""
+    """Return how far the position jumped between two poses, 0 where a vehicle can fly so far."""
     moved_m = hypot(after.north_m - before.north_m, after.east_m - before.east_m)
     elapsed_s = (after.stamp_ns - before.stamp_ns) * _NS
     return moved_m if moved_m > _JUMP_M + _FASTEST_M_S * elapsed_s else 0.0
@@ -47,11 +47,6 @@ def _altitude_jumped(before: Pose, after: Pose) -> bool:
     elapsed_s = (after.stamp_ns - before.stamp_ns) * _NS
     changed_m = abs(after.altitude_agl_m - before.altitude_agl_m)
     return changed_m > _ALTITUDE_JUMP_M + _FASTEST_VERTICAL_M_S * elapsed_s
-
-
-def _turn_rad(before: Pose, after: Pose) -> float:
-    pairs = zip(before.quaternion_ned_frd, after.quaternion_ned_frd, strict=True)
-    return 2.0 * acos(min(1.0, abs(sum(one * other for one, other in pairs))))
 
 
 class PoseHistory:
@@ -74,15 +69,9 @@ class PoseHistory:
 
     def add(self, pose: Pose) -> bool:
         """Keep a pose; False when it is not finite or not newer than the last."""
-        numbers = (
-            pose.north_m,
-            pose.east_m,
-            pose.down_m,
-            pose.altitude_agl_m,
-            *pose.quaternion_ned_frd,
-        )
+        numbers = (pose.north_m, pose.east_m, pose.down_m, pose.altitude_agl_m)
         length_sq = sum(part * part for part in pose.quaternion_ned_frd)
-        if not all(isfinite(number) for number in numbers) or not 0.98 < length_sq < 1.02:
+        if not all(map(isfinite, numbers)) or not 0.98 < length_sq < 1.02:
             return False
         if self._stamps and pose.stamp_ns <= self._stamps[-1]:
             return False
@@ -102,12 +91,13 @@ class PoseHistory:
         if after == 0:
             return Miss.TOO_OLD
         one, other = self._poses[after - 1], self._poses[after]
-        return self._gulf(one, other) or interpolate(one, other, stamp_ns)
+        return self._miss(one, other) or interpolate(one, other, stamp_ns)
 
-    def _gulf(self, one: Pose, other: Pose) -> Miss | None:
-        """Return why nothing can be said between two poses, None when it can."""
+    def _miss(self, one: Pose, other: Pose) -> Miss | None:
+        """Return why there is no pose between two others, None when there is."""
         if other.stamp_ns - one.stamp_ns > self._gap_limit_ns:
             return Miss.GAP
         if jump_m(one, other) > 0.0 or _altitude_jumped(one, other):
             return Miss.JUMP
-        return Miss.TURN if _turn_rad(one, other) > _TURN_LIMIT_RAD else None
+        turned_rad = angle_between(one.quaternion_ned_frd, other.quaternion_ned_frd)
+        return Miss.TURN if turned_rad > _TURN_LIMIT_RAD else None

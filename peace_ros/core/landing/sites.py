@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""SITE or NO_ZONE: the choice of a place to land from the layers of a map."""
+"""SITE or NO_ZONE: the choice of a place to land in the layers of a map."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from peace_ros.core.domain import Pose, Site
 from peace_ros.core.landing.decision import Focus, Verdict
+from peace_ros.core.landing.memory import FailedPlace
 from peace_ros.core.landing.parameters import (
     CELL_SCORE_FLOOR,
     SAFETY_THRESHOLD_FLOOR,
@@ -23,7 +24,7 @@ from peace_ros.core.landing.worth import Merits, worth
 from peace_ros.core.mapping import MapLayers
 
 _KEEP_FRACTION = 0.85
-"""A chosen site may lose this part of the required clearance before it is given up."""
+"""A chosen site is kept while it has this part of the required clearance."""
 _REFINE_RADIUS_M = 6.0
 """A chosen site moves towards the best place within this distance."""
 _REFINE_WAY = 0.125
@@ -33,15 +34,14 @@ it from the middle of its ground."""
 
 @dataclass(frozen=True)
 class Search:
-    """What a search looks for."""
+    """Where to look for a site, and what it needs."""
 
     pose: Pose
     focus: Focus
     threshold: float
     required_clearance_m: float
     age_limit_s: float
-    failed: tuple[tuple[float, float, float], ...] = ()
-    """North, east and radius in metres of places that failed."""
+    failed: tuple[FailedPlace, ...] = ()
     incumbent: Site | None = None
     """The present choice, kept unless another is clearly better."""
 
@@ -99,8 +99,8 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
         return Verdict.no_zone(
             'no ground in the focus is safe' if known else 'nothing is known yet'
         )
-    for north, east, radius in search.failed:
-        inside &= ~layers.disc(north, east, radius)
+    for each in search.failed:
+        inside &= ~layers.disc(each.north_m, each.east_m, each.radius_m)
     ground = _Ground(layers, safe, clearance(safe, layers.cell_m))
     kept = _keep(ground, search, inside, p)
     wide = inside & (ground.clearance_m >= search.required_clearance_m)

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What one step of the landing knows: what the map says, and everything else."""
+"""Input of one step of the landing: what the map says, and everything else."""
 
 from __future__ import annotations
 

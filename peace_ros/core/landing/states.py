@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The states of a landing, and when one follows another: a pure function over data."""
+"""The states of a landing and the rules of their transitions: a pure function over data."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from peace_ros.core.landing.parameters import LandingParameters
 
 
 class State(str, Enum):
-    """DOVESEI's states, and those of a vehicle that can be told to stop."""
+    """The states of DOVESEI, and those that a real vehicle needs besides."""
 
     IDLE = 'IDLE'
     """Not engaged."""
     SEARCHING = 'SEARCHING'
-    """Looks for a site, at and above the safe altitude also by flying a square."""
+    """Looks for a site; at and above the safe altitude it also flies an expanding square."""
     AIMING = 'AIMING'
     """Moves over the site."""
     LANDING = 'LANDING'
     """Descends over the site."""
     WAITING = 'WAITING'
-    """The site is lost: stands still."""
+    """The site is lost: hovers."""
     CLIMBING = 'CLIMBING'
-    """Back to the safe altitude."""
+    """Climbs to the safe altitude."""
     RESTARTING = 'RESTARTING'
     """Looks for another site than the one that failed."""
     RETURNING = 'RETURNING'
-    """A budget is used up: flies back to where the landing began, and never down."""
+    """A budget is used up: flies back to where the landing began, without descending."""
     HANDOVER = 'HANDOVER'
-    """Done: stands over a safe site at the altitude of the hand-over."""
+    """Done: hovers over a safe site at the hand-over altitude."""
     HOLD = 'HOLD'
-    """Data are missing or old, or a budget is used up: stands still."""
+    """Data are missing, old or wrong, or a budget is used up: hovers."""
     ABORTED = 'ABORTED'
-    """Somebody else flies; final until engaged again."""
+    """A pilot or a failsafe is in control; final until engaged again."""
 
 
 STILL_STATES = frozenset({State.IDLE, State.WAITING, State.HANDOVER, State.HOLD, State.ABORTED})
@@ -49,17 +49,17 @@ LOOKING = frozenset({State.SEARCHING, State.RESTARTING})
 
 @dataclass(frozen=True)
 class Events:
-    """What the state machine may know; everything about one moment."""
+    """Everything that the rules may use, for one step."""
 
     engaged: bool = False
     new_engagement: bool = False
     """Engaged since the last step."""
     taken_over: str = ''
-    """Why the vehicle is no longer ours; empty while it is."""
+    """Why we are no longer in control of the vehicle; empty while we are."""
     out_of_budget: str = ''
     """Which budget is used up; empty while there is time, battery, way and attempts."""
     policy_open: bool = False
-    """The policy for a used-up budget still has something to do other than to hold."""
+    """The policy for a used-up budget still has something to do before it holds."""
     bad_data: str = ''
     """What is missing, old or wrong; empty when data can be trusted."""
     site_known: bool = False
@@ -72,7 +72,7 @@ class Events:
     """The vehicle is near enough to the middle of the site to be handed over."""
     at_safe_altitude: bool = False
     low_enough_to_land: bool = False
-    """AIMING has nothing more to descend."""
+    """AIMING has descended as far as it may."""
     at_handover_altitude: bool = False
 
 
@@ -117,20 +117,20 @@ GUARDS: tuple[Rule, ...] = (
         'engaged: searching',
     ),
     Rule(
-        'in ABORTED, whatever happens',
+        'in ABORTED, in every case',
         lambda s, _e, _t, _p: s is State.ABORTED,
         State.ABORTED,
         'aborted: engage again to continue',
     ),
     Rule('disengaged', lambda _s, e, _t, _p: not e.engaged, State.IDLE, 'not engaged'),
     Rule(
-        'in HANDOVER, whatever happens',
+        'in HANDOVER, in every case',
         lambda s, _e, _t, _p: s is State.HANDOVER,
         State.HANDOVER,
-        'handed over: standing over a safe site',
+        'handed over: hovering over a safe site',
     ),
     Rule(
-        'the autopilot left our mode, or the vehicle was disarmed',
+        'the autopilot left the mode that follows our set-points, or the vehicle was disarmed',
         lambda _s, e, _t, _p: bool(e.taken_over),
         State.ABORTED,
         '{taken_over}',
@@ -154,7 +154,20 @@ GUARDS: tuple[Rule, ...] = (
         '{out_of_budget}: returning to where the landing began',
     ),
 )
-"""What outranks every plan in every state, the first that holds first."""
+"""Rules for every state, checked before those of the state, in this order."""
+
+_LOST = Rule(
+    'the SITE is lost',
+    lambda _s, e, _t, _p: not e.site_known,
+    State.WAITING,
+    'the site is lost: waiting for it',
+)
+_NO_SITE_BELOW = Rule(
+    'no SITE below the safe altitude for {giveup_after_s} s',
+    lambda _s, e, t, p: not e.site_known and not e.at_safe_altitude and t >= p.giveup_after_s,
+    State.CLIMBING,
+    'no site below the safe altitude: climbing to look around',
+)
 
 RULES: dict[State, tuple[Rule, ...]] = {
     State.IDLE: (
@@ -167,22 +180,10 @@ RULES: dict[State, tuple[Rule, ...]] = {
             State.AIMING,
             'a site is known: moving over it',
         ),
-        Rule(
-            'no SITE below the safe altitude for {giveup_after_s} s',
-            lambda _s, e, t, p: (
-                not e.site_known and not e.at_safe_altitude and t >= p.giveup_after_s
-            ),
-            State.CLIMBING,
-            'no site below the safe altitude: climbing to look around',
-        ),
+        _NO_SITE_BELOW,
     ),
     State.AIMING: (
-        Rule(
-            'the SITE is lost',
-            lambda _s, e, _t, _p: not e.site_known,
-            State.WAITING,
-            'the site is lost: waiting for it',
-        ),
+        _LOST,
         Rule(
             'over the SITE on ground just seen, and at {aiming_floor} safe altitudes or below',
             lambda _s, e, _t, _p: e.over_site and e.low_enough_to_land,
@@ -203,18 +204,13 @@ RULES: dict[State, tuple[Rule, ...]] = {
         ),
     ),
     State.LANDING: (
+        _LOST,
         Rule(
-            'the SITE is lost',
-            lambda _s, e, _t, _p: not e.site_known,
-            State.WAITING,
-            'the site is lost: waiting for it',
-        ),
-        Rule(
-            'at the altitude of the hand-over, over the SITE on ground just seen, and within '
+            'at the hand-over altitude, over the SITE on ground just seen, and within '
             '{handover_error_m} m of its middle',
             lambda _s, e, _t, _p: e.at_handover_altitude and e.over_site and e.centred,
             State.HANDOVER,
-            'at the altitude of the hand-over over a safe site',
+            'at the hand-over altitude over a safe site',
         ),
         Rule(
             'for {max_landing_s} s',
@@ -234,13 +230,13 @@ RULES: dict[State, tuple[Rule, ...]] = {
             'for {giveup_after_s} s, below the safe altitude',
             lambda _s, e, t, p: t >= p.giveup_after_s and not e.at_safe_altitude,
             State.CLIMBING,
-            'the site stays lost: climbing to the safe altitude',
+            'the site was not found again: climbing to the safe altitude',
         ),
         Rule(
             'for {giveup_after_s} s, at the safe altitude',
             lambda _s, _e, t, p: t >= p.giveup_after_s,
             State.RESTARTING,
-            'the site stays lost: looking for another',
+            'the site was not found again: looking for another',
         ),
     ),
     State.CLIMBING: (
@@ -258,19 +254,12 @@ RULES: dict[State, tuple[Rule, ...]] = {
             State.AIMING,
             'another site is known: moving over it',
         ),
-        Rule(
-            'sunk below the safe altitude for {giveup_after_s} s without a SITE',
-            lambda _s, e, t, p: (
-                not e.site_known and not e.at_safe_altitude and t >= p.giveup_after_s
-            ),
-            State.CLIMBING,
-            'no site below the safe altitude: climbing to look around',
-        ),
+        _NO_SITE_BELOW,
         Rule(
             'for {search4new_place_s} s',
             lambda _s, _e, t, p: t >= p.search4new_place_s,
             State.SEARCHING,
-            'no other site near by: searching farther',
+            'no other site nearby: searching farther away',
         ),
     ),
     State.RETURNING: (
@@ -278,7 +267,7 @@ RULES: dict[State, tuple[Rule, ...]] = {
             'the budget is no longer used up',
             lambda _s, e, _t, _p: not e.out_of_budget,
             State.SEARCHING,
-            'there is budget again: searching',
+            'the budget is no longer used up: searching',
         ),
     ),
     State.HOLD: (
@@ -292,13 +281,13 @@ RULES: dict[State, tuple[Rule, ...]] = {
     State.HANDOVER: (),
     State.ABORTED: (),
 }
-"""The plan of each state; the first rule that holds decides, and without one it stays."""
+"""Rules of each state: the first that holds decides; when none holds the state stays."""
 
 
 def next_state(
     state: State, events: Events, time_in_state_s: float, parameters: LandingParameters
 ) -> tuple[State, str]:
-    """Return the state that follows, with a sentence that says why; an empty one when it stays."""
+    """Return the next state and a sentence that says why, empty when the state stays."""
     for rule in GUARDS:
         if rule.holds(state, events, time_in_state_s, parameters):
             return rule.target, rule.reason.format_map(vars(events))

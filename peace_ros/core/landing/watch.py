@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What must be true before anything moves: control, telemetry, heatmaps, budgets."""
+"""Conditions of every motion: control, telemetry, heatmaps, budgets."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _AT_ALTITUDE = 0.98
 
 
 def valid_pose(telemetry: Telemetry | None, parameters: LandingParameters) -> Pose | None:
-    """Return the pose of telemetry when it can be believed."""
+    """Return the pose of telemetry when it is valid, else None."""
     pose = None if telemetry is None else telemetry.pose
     if pose is None:
         return None
@@ -26,28 +26,28 @@ def valid_pose(telemetry: Telemetry | None, parameters: LandingParameters) -> Po
 
 
 def at_safe_altitude(pose: Pose | None, parameters: LandingParameters) -> bool:
-    """Tell whether lateral motion meets no obstacle here."""
+    """Return whether lateral motion meets no obstacle at this altitude."""
     if pose is None:
         return False
     return pose.altitude_agl_m >= _AT_ALTITUDE * parameters.safe_altitude_m
 
 
 class ControlWatch:
-    """Notices when somebody else takes over; one per engagement."""
+    """Notices when a pilot or a failsafe takes over; one per engagement."""
 
     def __init__(self) -> None:
         self._had_control = self._was_armed = False
         self.taken_over = ''
-        """Why the vehicle is no longer ours; never emptied again."""
+        """Why we are no longer in control of the vehicle; once set, it stays."""
 
     def see(self, telemetry: Telemetry | None) -> None:
-        """Look at telemetry, even old: a take-over that was said once is believed."""
+        """Check telemetry, even old: a take-over that was reported once counts."""
         if telemetry is None or self.taken_over:
             return
         if self._had_control and not telemetry.in_control:
             self.taken_over = (
-                f'the autopilot went to mode {telemetry.mode or "unknown"} unasked: '
-                'a pilot or a failsafe flies now'
+                f'the autopilot changed to mode {telemetry.mode or "unknown"} without our request: '
+                'a pilot or a failsafe is in control'
             )
         elif self._was_armed and not telemetry.armed:
             self.taken_over = 'the vehicle was disarmed'
@@ -99,7 +99,7 @@ def bad_map(map_age_s: float, last_rejection: str, parameters: LandingParameters
 
 
 class Budget:
-    """Counts what an engagement uses up: time, way, attempts and battery."""
+    """Counts what an engagement uses: time, distance, attempts and battery."""
 
     def __init__(self, parameters: LandingParameters) -> None:
         self._p = parameters
@@ -110,9 +110,9 @@ class Budget:
         self._ever_site = False
         self._policy_done = False
         self.without_site_s = 0.0
-        """Time since a site was last known, counted while one is looked for."""
+        """Time in search since a site was last known."""
         self.search_m = 0.0
-        """Way flown in search."""
+        """Distance flown in search."""
         self.attempts = 0
         """Descents that failed."""
         self.outcome = ''
@@ -123,7 +123,7 @@ class Budget:
     def spend(
         self, now_ns: int, telemetry: Telemetry | None, *, looking: bool, site_known: bool
     ) -> None:
-        """Tell the time; ``looking`` is whether a site is looked for with good data."""
+        """Count one step; ``looking`` is whether a site is searched with good data."""
         if self._begun_ns is None:
             self._begun_ns = self._last_ns = now_ns
         elapsed_s = max(0.0, (now_ns - self._last_ns) * _NS)
@@ -139,18 +139,18 @@ class Budget:
             self._spent_ns = self._last_ns
 
     def fail_attempt(self) -> None:
-        """Count a descent that failed; after the budget it was the last one."""
+        """Count a descent that failed; once a budget is used up there is no further one."""
         self.attempts += 1
         if self.outcome:
             self.finish_policy()
 
     def finish_policy(self) -> None:
-        """The policy for a used-up budget has nothing more to do."""
+        """Note that the policy for a used-up budget has nothing more to do."""
         self._policy_done = True
 
     @property
     def policy_open(self) -> bool:
-        """Something other than to hold is still to be done; False while nothing is used up."""
+        """The policy for a used-up budget has something to do before it holds."""
         if not self.outcome or self._policy_done or self._p.budget_policy == 'hold':
             return False
         return (self._last_ns - self._spent_ns) * _NS <= self._p.policy_time_s
@@ -171,9 +171,8 @@ class Budget:
         if self.without_site_s > p.max_search_s:
             return 'no_zone', f'no safe place was found in {p.max_search_s:.0f} s of searching'
         if self.search_m > p.search_distance_m:
-            way = f'no safe place was found on {p.search_distance_m:.0f} m of searching'
-            return 'no_zone', way
-        # Written so that a battery that is no number is no battery that is full.
+            return 'no_zone', f'no safe place was found on {p.search_distance_m:.0f} m of searching'
+        # `not >`: a level that is not a number counts as empty.
         if p.battery_reserve > 0.0 and battery is not None and not battery > p.battery_reserve:
             return 'battery', f'battery at {battery:.0%}, reserve {p.battery_reserve:.0%}'
         if total_s > p.max_total_s:

@@ -1,10 +1,9 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Is the ground flat? What a depth camera measures closes ground that is rough; it never opens any.
+"""Flatness of the ground by a depth camera: closes ground that is rough, and never opens any.
 
-The heights of the measured points spread, within the width of a vehicle, by a standard deviation:
-the smoothness of DOVESEI, but of heights instead of depths, so that a camera that leans finds level
-ground as flat as one that does not.
+Roughness is the standard deviation of the heights within the width of a vehicle: the smoothness of
+DOVESEI, but of heights instead of depths, so that a tilted camera finds level ground flat too.
 """
 
 from __future__ import annotations
@@ -17,9 +16,9 @@ from numpy.typing import NDArray
 
 from peace_ros.core.domain import Camera, DepthImage, Pose
 from peace_ros.core.domain.geometry import rotation_matrix
+from peace_ros.core.mapping.layers import shifted
 from peace_ros.core.mapping.parameters import MapParameters
 from peace_ros.core.mapping.projection import GroundGrid
-from peace_ros.core.mapping.shifting import shifted
 
 _LARGEST_PX = 160
 """Larger pictures are read at every second, third, ... pixel."""
@@ -108,7 +107,7 @@ def _spread_m(
 
 
 class Roughness:
-    """Which cells were rough when they were measured last."""
+    """Cells that were rough when they were measured last."""
 
     def __init__(self, cells: int) -> None:
         self._cells = cells

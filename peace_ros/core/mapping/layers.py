@@ -6,9 +6,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import floor
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+_Cell = TypeVar('_Cell', bound=np.generic)
 
 
 @dataclass(frozen=True)
@@ -55,3 +58,17 @@ class MapLayers:
         north, east = self.distances_m(north_m, east_m)
         inside: NDArray[np.bool_] = north * north + east * east <= radius_m * radius_m
         return inside
+
+
+def shifted(array: NDArray[_Cell], d_row: int, d_column: int, fill: float) -> NDArray[_Cell]:
+    """Return the array as seen from a window moved by whole cells; new cells hold ``fill``."""
+    rows, columns = array.shape
+    moved = np.full_like(array, fill)
+    if abs(d_row) < rows and abs(d_column) < columns:
+        target = moved[
+            max(0, -d_row) : rows - max(0, d_row), max(0, -d_column) : columns - max(0, d_column)
+        ]
+        target[...] = array[
+            max(0, d_row) : rows - max(0, -d_row), max(0, d_column) : columns - max(0, -d_column)
+        ]
+    return moved

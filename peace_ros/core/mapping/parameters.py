@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a map of safe ground can be told."""
+"""Parameters of the map of safe ground."""
 
 from __future__ import annotations
 

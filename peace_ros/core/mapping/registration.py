@@ -1,11 +1,11 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How far a camera moved between two pictures of the ground, told from the pictures alone.
+"""How far a camera moved between two pictures of the ground, measured in the pictures alone.
 
-Both pictures are laid onto level ground with their own attitude and altitude, which takes
-rotation, tilt and scale out of them; what remains is a shift, found by phase correlation (Kuglin
-and Hines, 1975). A shift is believed only when one peak stands out, when the pictures agree after
-it, and when they have texture at all; otherwise the answer is a reason.
+Both pictures are projected onto level ground with their own attitude and altitude, which removes
+rotation, tilt and scale; what remains is a shift, found by phase correlation (Kuglin and Hines,
+1975). A shift counts only when the pictures have texture, one peak stands out, and the pictures
+agree after it; otherwise the result is a reason.
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ _LARGEST_SHIFT = 0.35
 _LEAST_TEXTURE = 3.0
 """Standard deviation in grey levels."""
 _LEAST_CROSS_TEXTURE = 0.03
-"""Gradients across over those along the main direction: nothing tells motion along stripes."""
+"""Ratio of the gradients across and along the main direction: stripes do not show motion along."""
 _LEAST_PEAK_RATIO = 1.6
-"""The best peak over the second best: ploughed rows and parking lots look alike everywhere."""
+"""Ratio of the best peak to the second best: ploughed rows and car parks repeat themselves."""
 _LEAST_CORRELATION = 0.5
 _PEAK_RADIUS_PX = 6
 _PASSBAND = 0.2
 """Cycles per pixel at which the weight of a frequency has fallen to 0.6: above is noise."""
 _ERROR_PX = 0.3
 _ERROR_PER_ALTITUDE = 0.005
-"""Attitude errs by 0.3 deg between two pictures."""
+"""Error of the attitude between two pictures: 0.3 deg."""
 _ERROR_PER_DISTANCE = 0.02
-"""Altitude, and with it the scale, errs by 2 %."""
+"""Error of the altitude, and with it of the scale: 2 %."""
 VIEW_PX = 256
 """Longer edge of the pictures that are kept."""
 
@@ -74,7 +74,7 @@ class Displacement:
 
 
 class Mismatch(Enum):
-    """Why two pictures do not tell how far the camera moved."""
+    """Why two pictures do not show how far the camera moved."""
 
     SAME = 'the camera gave the same picture twice'
     ALTITUDE = 'the altitudes of the pictures differ too much'
@@ -97,7 +97,7 @@ def small_grey(image_rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def register(before: View, after: View, camera: Camera) -> Displacement | Mismatch:
-    """Return how far the camera moved from one view to the other, or why it cannot be told.
+    """Return how far the camera moved from one view to the other, or why that is unknown.
 
     :param camera: that of the full frames.
     """

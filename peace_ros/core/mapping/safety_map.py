@@ -3,9 +3,9 @@
 """A ground grid in the local frame that gathers heatmaps, forgets, and follows the vehicle.
 
 Each cell holds log-odds of being safe, in the way of occupancy grids (Moravec and Elfes, 1985),
-with four differences that people on the ground ask for: evidence for unsafe weighs more and is
-kept longer, frames of one scene are not taken for independent, a closer look outweighs any number
-of farther ones, and what looks clearly unsafe closes the ground at once (see ``veto``).
+with four differences that protect people on the ground: evidence for unsafe weighs more and is
+kept longer, frames of one scene do not count as independent, a closer look outweighs any number of
+farther ones, and what looks clearly unsafe closes the ground at once (see ``veto``).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from peace_ros.core.domain import Camera, DepthImage, Heatmap, ImageError, Pose
 from peace_ros.core.domain.errors import VehicleError
 from peace_ros.core.mapping.flatness import Roughness, rough_and_flat
-from peace_ros.core.mapping.layers import MapLayers
+from peace_ros.core.mapping.layers import MapLayers, shifted
 from peace_ros.core.mapping.parameters import MapParameters
 from peace_ros.core.mapping.projection import (
     GroundGrid,
@@ -32,16 +32,15 @@ from peace_ros.core.mapping.projection import (
     visible_window,
     worst_part,
 )
-from peace_ros.core.mapping.shifting import shifted
 from peace_ros.core.mapping.veto import Veto, blobs
 
 LOWEST_LOOK_M = 1.0
-"""From lower, a frame shows less ground than the vehicle covers, and a cell is the whole image."""
+"""Frames from lower are rejected: they show less ground than the vehicle covers."""
 _NS = 1e-9
 _NEVER_S = np.float32(-1e9)
 _LOOKS_LIMIT = 60_000
 _SEEN, _CLEARLY_UNSAFE = 1, 2
-"""Kinds of pixels; 0 is not believed."""
+"""Kinds of pixels; 0 is ignored."""
 _COARSER = 1.5
 """A look whose pixels are this much larger on the ground does not contradict a finer one."""
 _MOST_HALVINGS = 60.0
@@ -340,12 +339,8 @@ class SafetyMap:
         """
         cell = self.parameters.map_cell_m
         layers = self.layers(now_ns, (north_m, east_m, radius_m + cell))
-        south, west = (edge // cell for edge in (north_m - radius_m, east_m - radius_m))
-        north, east = (edge // cell for edge in (north_m + radius_m, east_m + radius_m))
-        last_row, last_column = self._first_row + self._cells, self._first_column + self._cells
-        if south < self._first_row or west < self._first_column:
-            return 0.0, float('inf')
-        if north >= last_row or east >= last_column:
-            return 0.0, float('inf')
+        for sign in (-1.0, 1.0):
+            if layers.cell_at(north_m + sign * radius_m, east_m + sign * radius_m) is None:
+                return 0.0, float('inf')
         inside = layers.disc(north_m, east_m, max(radius_m, cell))
         return float(layers.score[inside].min()), float(layers.age_s[inside].max())

@@ -1,10 +1,10 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What moves in: ground that looks clearly unsafe once is closed at once, whatever it was before.
+"""Ground that looks clearly unsafe once is closed at once, whatever it was before.
 
-Accumulated evidence is slow on purpose; a person who steps onto ground that was seen safe fifty
-times must not wait until they are believed. So a veto stands beside the log-odds: one clear look
-sets it, several clear looks and some time lift it.
+Accumulated evidence is slow on purpose, too slow for a person who steps onto ground that was seen
+safe fifty times. So a veto works beside the log-odds: one clearly unsafe look sets it; several safe
+looks and some time lift it.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from peace_ros.core.mapping.layers import shifted
 from peace_ros.core.mapping.parameters import MapParameters
 from peace_ros.core.mapping.projection import Window
-from peace_ros.core.mapping.shifting import shifted
 
 WHOLE_VIEW = 0.8
-"""When more of the safe ground in view turns unsafe within one frame, the frame has changed (light,
-prompt, a fault of the model), not the ground: nothing that moves fills that much."""
+"""When more than this part of the safe ground in view turns unsafe within one frame, the frame has
+changed (light, prompt, a model error), not the ground: nothing that moves covers so much."""
 WHOLE_VIEW_LEAST_M2 = 100.0
-"""On less safe ground than this anything that moves might be all of it."""
+"""Less safe ground than this can be covered completely by something that moves."""
 _FEWEST_PIXELS = 2
 """A blob is this many pixels wide at least: a single one is noise."""
 _MOST_STRIKES = 5
-"""Clearly unsafe looks that make the wait longer."""
+"""Number of clearly unsafe looks that make the wait longer."""
 _NEVER_S = np.float32(-1e9)
 
 
 def blobs(
     safety: NDArray[np.uint8], pixel_m: float, pixels_per_cell: float, parameters: MapParameters
 ) -> NDArray[np.uint8] | None:
-    """Return where a heatmap is clearly unsafe over a blob, None when it is so nowhere.
+    """Return the clearly unsafe blobs of a heatmap, None when there are none.
 
     Blobs are grown by half a cell, so that sampling at the middles of cells misses none.
 

@@ -152,3 +152,84 @@ def test_a_turn_from_descent_to_climb_passes_through_no_descent():
         guard.limit(Setpoint(0, 0.0, 0.0, 2.0), seen(now_ns=step * 500_000_000))
     out, _ = guard.limit(Setpoint(0, 0.0, 0.0, -2.0), seen(now_ns=9 * 500_000_000 + 10**8))
     assert out.v_down_m_s == pytest.approx(-0.3)
+
+
+@pytest.mark.parametrize(
+    ('given_now', 'down_m_s'),
+    [
+        (seen(telemetry_age_s=0.7), 2.0),
+        (seen(map_age_s=1.5, ground_age_s=0.1), 2.0),
+        (seen(ground_age_s=1.5), 2.0),
+        (seen(ground_score=0.5), 2.0),
+        (seen(altitude_m=500.0), 2.0),
+        (seen(altitude_m=500.1), 0.0),
+        (seen(altitude_m=22.0), 2.0),
+        (seen(altitude_m=20.5), 0.5),
+        (seen(altitude_m=20.0), 0.0),
+        (seen(verdict=Verdict.found(Site(0.0, 4.5, 6.0, 100.0, 0.9, 0.1))), 2.0),
+        (replace(seen(), pose=None), 0.0),
+    ],
+)
+def test_the_bounds_of_a_descent_are_inclusive(given_now, down_m_s):
+    assert limited(Setpoint(0, 0.0, 0.0, 2.0), given_now)[0].v_down_m_s == pytest.approx(down_m_s)
+
+
+def test_speed_is_limited_along_its_direction():
+    out, notes = limited(Setpoint(0, -6.0, 8.0, -9.0), seen())
+    assert (out.v_north_m_s, out.v_east_m_s, out.v_down_m_s) == pytest.approx((-3.0, 4.0, -3.0))
+    assert notes == ('speed limited',)
+    at_limit = Setpoint(0, 3.0, 4.0, 3.0)
+    assert limited(at_limit, seen()) == (at_limit, ())
+
+
+@pytest.mark.parametrize(
+    ('north_m', 'wish', 'expected'),
+    [
+        (47.0, (2.0, 0.0), (2.0, 0.0)),
+        (47.0, (4.0, 2.0), (2.0, 1.0)),
+        (50.0, (4.0, 2.0), (0.0, 0.0)),
+        (53.0, (4.0, 2.0), (0.0, 0.0)),
+        (50.0, (0.0, 2.0), (0.0, 2.0)),
+        (0.0, (3.0, 4.0), (3.0, 4.0)),
+        (-47.0, (-4.0, 0.0), (-2.0, 0.0)),
+        (-60.0, (4.0, 0.0), (4.0, 0.0)),
+    ],
+)
+def test_the_fence_slows_what_leads_outwards_in_proportion_to_the_room(north_m, wish, expected):
+    out, notes = limited(Setpoint(0, *wish, 0.0), seen(north_m=north_m))
+    assert (out.v_north_m_s, out.v_east_m_s) == pytest.approx(expected)
+    assert bool(notes) == (wish != expected)
+    for free in (replace(P, geofence_radius_m=0.0), P):
+        given_now = replace(seen(north_m=north_m), home=None if free is P else HOME)
+        assert limited(Setpoint(0, *wish, 0.0), given_now, free) == (Setpoint(0, *wish, 0.0), ())
+
+
+def test_the_fence_is_around_where_the_landing_began():
+    begun = Pose(0, 100.0, 30.0, -60.0, LEVEL, 60.0)
+    given_now = replace(seen(north_m=100.0), home=begun)
+    # 30 m to the west of home, 20 m of room.
+    assert limited(Setpoint(0, 0.0, -5.0, 0.0), given_now)[0].v_east_m_s == -5.0
+    near = replace(begun, east_m=47.0)
+    out, _ = limited(Setpoint(0, 0.0, -5.0, 0.0), replace(given_now, home=near))
+    assert out.v_east_m_s == pytest.approx(-2.0)
+
+
+@pytest.mark.parametrize(
+    ('elapsed_s', 'speed_m_s'),
+    [(0.0, 0.3), (0.2, 0.9), (0.5, 1.8), (3.0, 1.8), (-1.0, 0.3)],
+)
+def test_speed_grows_with_the_time_between_two_steps_up_to_half_a_second(elapsed_s, speed_m_s):
+    guard, wish = Guard(P), Setpoint(0, 4.0, 0.0, 0.0)
+    first, notes = guard.limit(wish, seen(now_ns=10**12))
+    assert first.v_north_m_s == pytest.approx(0.3)
+    assert notes == ('acceleration limited',)
+    second, _ = guard.limit(wish, seen(now_ns=10**12 + round(elapsed_s * 1e9)))
+    assert second.v_north_m_s == pytest.approx(speed_m_s)
+
+
+def test_a_change_of_direction_begins_at_zero():
+    guard = Guard(P)
+    for step in range(10):
+        guard.limit(Setpoint(0, 4.0, -4.0, 0.0), seen(now_ns=step * 500_000_000))
+    out, _ = guard.limit(Setpoint(0, -4.0, -2.0, 0.0), seen(now_ns=9 * 500_000_000 + 10**8))
+    assert (out.v_north_m_s, out.v_east_m_s) == pytest.approx((-0.3, -2.0))

@@ -76,3 +76,41 @@ def test_a_place_is_remembered_as_it_was_last_seen():
     memory.see(site(30.0, 7.0))
     memory.see(site(1.0, 4.0))
     assert memory.best().north_m == 30.0
+
+
+@pytest.mark.parametrize(('apart_m', 'north_m'), [(10.0, 1000.0), (10.1, 0.0)])
+def test_a_place_within_10_m_is_the_same_place(apart_m, north_m):
+    memory = SiteMemory(P)
+    memory.see(site(0.0, 11.0))
+    memory.see(site(1000.0, 9.0))
+    memory.see(site(apart_m, 4.0))
+    assert memory.best().north_m == north_m
+
+
+def test_the_oldest_of_many_places_is_forgotten():
+    memory = SiteMemory(P)
+    memory.see(site(0.0, 11.0))
+    for number in range(1, 33):
+        memory.see(site(100.0 * number, 5.0))
+        assert (memory.best().north_m == 0.0) is (number <= 32)
+    memory.see(site(9000.0, 4.0))
+    assert memory.best().north_m == 100.0
+
+
+def test_a_failed_place_covers_its_rim():
+    memory = SiteMemory(P)
+    place = memory.fail(site(0.0, 10.0), 5 * S)
+    assert place.covers(site(10.0))
+    assert not place.covers(site(10.1))
+    assert place.until_ns == 5 * S + round(P.failed_site_memory_s * S)
+    memory.forgive(place.until_ns - 1)
+    assert memory.failed == (place,)
+    memory.forgive(place.until_ns)
+    assert memory.failed == ()
+
+
+def test_doubt_weighs_squared_as_in_the_choice_of_a_site():
+    memory = SiteMemory(P)
+    memory.see(site(0.0, 10.0, 0.9))
+    memory.see(site(50.0, 12.0, 0.8))
+    assert memory.best().north_m == 0.0

@@ -113,7 +113,7 @@ def test_a_position_that_comes_back_elsewhere_drops_the_map(eye):
     flight = Outage(eye, back_m=9.0)
     flight.run(BACK_S)
     assert flight.intake.drops == 1
-    assert 'from where pictures led' in flight.intake.last_rejection
+    assert 'from the estimate by pictures' in flight.intake.last_rejection
     flight.run(BACK_S + 2.0)
     assert flight.intake.drops == 1
     assert flight.edge_m() == pytest.approx(SAFE_M + 9.0, abs=1.0)

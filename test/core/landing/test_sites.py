@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from peace_ros.core.domain import Pose, Site
 from peace_ros.core.landing import SAFETY_THRESHOLD_FLOOR, Focus, LandingParameters, VerdictKind
+from peace_ros.core.landing.memory import FailedPlace
 from peace_ros.core.landing.sites import Search, clearance, find_site, safe_ground
 from peace_ros.core.mapping import MapLayers
 
@@ -138,7 +139,7 @@ def test_looks_only_within_the_focus():
 def test_places_that_failed_are_left_out():
     layers = layers_with((0.0, 0.0, 6.5), (35.0, 0.0, 6.5))
     assert abs(find_site(layers, SEARCH, P).site.north_m) < 3.0
-    again = find_site(layers, replace(SEARCH, failed=((0.0, 0.0, 8.0),)), P).site
+    again = find_site(layers, replace(SEARCH, failed=(FailedPlace(0.0, 0.0, 8.0, 0),)), P).site
     assert again.north_m > 30.0
 
 
@@ -166,7 +167,7 @@ def layers_of_boxes(*boxes: tuple[float, float, float, float], score: float = 0.
             id='width of the whole lawn',
         ),
         pytest.param(
-            layers_of_boxes((-25.0, 0.0, 17.0, 61.0), (25.0, 0.0, 24.0, 24.0)),
+            layers_of_boxes((-25.0, 0.0, 20.0, 61.0), (25.0, 0.0, 24.0, 24.0)),
             replace(P, ample_clearance_m=6.0, distance_scale_m=1000.0),
             id='compactness',
         ),
@@ -227,6 +228,25 @@ def test_a_choice_does_not_drift_over_a_large_field():
     search = replace(SEARCH, incumbent=Site(5.25, -4.75, 12.0, 4000.0, 0.95, 0.0))
     site = find_site(layers_with((0.0, 0.0, 40.0)), search, P).site
     assert (site.north_m, site.east_m) == (5.25, -4.75)
+
+
+def test_a_rival_may_lie_on_ground_of_exactly_the_clearance_that_is_kept():
+    layers = layers_with((0.25, 0.25, 6.0))
+    clearance_m = float(clearance(safe_ground(layers, 0.8, 10.0, 3), 0.5)[100, 100])
+    search = replace(SEARCH, incumbent=Site(0.25, 0.25, 4.0, 90.0, 0.95, 0.0))
+    for needed_m, kind in ((clearance_m, VerdictKind.SITE), (1.01 * clearance_m, None)):
+        kept = replace(search, required_clearance_m=needed_m / 0.85)
+        assert (find_site(layers, kept, P).kind is VerdictKind.SITE) is (kind is not None)
+
+
+def test_the_confidence_of_a_site_is_the_mean_score_within_its_clearance():
+    layers = layers_with((0.25, 0.25, 8.0))
+    layers.score[layers.disc(0.25, 0.25, 3.0)] = 0.9
+    site = find_site(layers, SEARCH, replace(P, distance_scale_m=1000.0)).site
+    assert (site.north_m, site.east_m) == (0.25, 0.25)
+    disc = layers.disc(0.25, 0.25, site.clearance_m)
+    assert site.confidence == pytest.approx(float(layers.score[disc].mean()))
+    assert 0.905 < site.confidence < 0.945
 
 
 def test_a_site_tells_of_its_ground_what_the_map_shows():

@@ -7,8 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from peace_ros.core.mapping.layers import MapLayers
-from peace_ros.core.mapping.shifting import shifted
+from peace_ros.core.mapping.layers import MapLayers, shifted
 
 ROWS, COLUMNS = 6, 9
 LAYERS = MapLayers(
