@@ -3,9 +3,9 @@
 """Heatmaps, decisions and set-points of the small bag, against those of version 3523282.
 
 ``small_digest.npz`` was written by that version. The networks' sums differ a little between
-processors, so their heatmaps are compared with a tolerance, and the decisions are those that the
-landing makes over the stored heatmaps. ``python test_digest.py FILE`` writes what this version
-gives.
+processors. Where the checksums of all heatmaps are those of the stored version, decisions and
+set-points must be equal too; elsewhere heatmaps and states are compared with a tolerance.
+``python test_digest.py FILE`` writes what this version gives.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from peace_ros.lab.replay.source import SourceOptions, open_source
 DATA = Path(__file__).resolve().parents[2] / 'data'
 STORED = DATA / 'small_digest.npz'
 SIDE = 44
-"""Heatmaps are stored as SIDE x SIDE means, quantised like those of the topic ``heatmap``."""
+"""Heatmaps are stored as SIDE x SIDE means."""
 
 
 def replayed(preset: str = 'peace_cs') -> tuple[list, list]:
@@ -41,8 +41,13 @@ def replayed(preset: str = 'peace_cs') -> tuple[list, list]:
     )
 
 
+def levels_of(looks: list) -> np.ndarray:
+    """Return the heatmaps as bytes, like those of the topic ``heatmap``."""
+    return np.stack([np.rint(255.0 * look.heatmap.safety).astype(np.uint8) for look in looks])
+
+
 def digest_of_looks(looks: list) -> dict[str, np.ndarray]:
-    levels = [np.rint(255.0 * look.heatmap.safety).astype(np.uint8) for look in looks]
+    levels = levels_of(looks)
     small = [cv2.resize(each, (SIDE, SIDE), interpolation=cv2.INTER_AREA) for each in levels]
     return {
         'stamps_ns': np.array([look.heatmap.stamp_ns for look in looks]),
@@ -76,8 +81,8 @@ def digest_of_steps(steps: list) -> dict[str, np.ndarray]:
     }
 
 
-class StoredSegmenter:
-    """Gives back the stored heatmaps."""
+class RecordedSegmenter:
+    """Gives back recorded heatmaps."""
 
     def __init__(self, stamps_ns: np.ndarray, heatmaps: np.ndarray) -> None:
         self._levels = dict(zip(stamps_ns.tolist(), heatmaps, strict=True))
@@ -88,12 +93,12 @@ class StoredSegmenter:
 
 
 def decided_over(stamps_ns: np.ndarray, heatmaps: np.ndarray) -> dict[str, np.ndarray]:
-    """Return what the landing decides over stored heatmaps."""
+    """Return what the landing decides over recorded heatmaps, uint8 [N, height, width]."""
 
     class Line(ReplayLine):
         def __init__(self, *given, **options) -> None:
             super().__init__(*given, **options)
-            self.pipeline.segmenter = StoredSegmenter(stamps_ns, heatmaps)
+            self.pipeline.segmenter = RecordedSegmenter(stamps_ns, heatmaps)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run, 'ReplayLine', Line)
@@ -107,8 +112,13 @@ def stored() -> SimpleNamespace:
         return SimpleNamespace(**{name: arrays[name] for name in arrays.files})
 
 
-def test_heatmaps_and_prompts_are_those_of_the_stored_version(stored) -> None:
-    found = SimpleNamespace(**digest_of_looks(replayed()[0]))
+@pytest.fixture(scope='module')
+def looks() -> list:
+    return replayed()[0]
+
+
+def test_heatmaps_and_prompts_are_those_of_the_stored_version(looks, stored) -> None:
+    found = SimpleNamespace(**digest_of_looks(looks))
     np.testing.assert_array_equal(found.stamps_ns, stored.stamps_ns)
     assert np.mean(found.prompts == stored.prompts) >= 0.95
     apart = np.abs(found.heatmaps.astype(int) - stored.heatmaps.astype(int))
@@ -120,9 +130,13 @@ def test_heatmaps_and_prompts_are_those_of_the_stored_version(stored) -> None:
         np.testing.assert_array_equal(found.checksums, stored.checksums)
 
 
-def test_decisions_and_setpoints_are_those_of_the_stored_version(stored) -> None:
-    found = SimpleNamespace(**decided_over(stored.stamps_ns, stored.heatmaps))
+def test_decisions_and_setpoints_are_those_of_the_stored_version(looks, stored) -> None:
+    levels = levels_of(looks)
+    found = SimpleNamespace(**decided_over(stored.stamps_ns, levels))
     assert len(set(stored.states)) >= 4, 'too few states: this would prove nothing'
+    if [crc32(each.tobytes()) for each in levels] != stored.checksums.tolist():
+        assert np.mean(found.states == stored.states) >= 0.9
+        return
     np.testing.assert_array_equal(found.states, stored.states)
     np.testing.assert_array_equal(found.reasons, stored.reasons)
     np.testing.assert_array_equal(found.setpoint_stamps_ns, stored.setpoint_stamps_ns)
@@ -131,6 +145,7 @@ def test_decisions_and_setpoints_are_those_of_the_stored_version(stored) -> None
 
 
 if __name__ == '__main__':
-    seen = digest_of_looks(replayed()[0])
-    decided = decided_over(seen['stamps_ns'], seen['heatmaps'])
-    np.savez_compressed(sys.argv[1], **seen, **decided)
+    seen = replayed()[0]
+    digest = digest_of_looks(seen)
+    decided = decided_over(digest['stamps_ns'], levels_of(seen))
+    np.savez_compressed(sys.argv[1], **digest, **decided)
