@@ -393,3 +393,12 @@ def test_a_disengaged_helm_counts_nothing_and_an_engaged_one_begins_at_its_first
     assert decided(helm, time_s=52.0).outcome == 'timeout'
     helm.disengage()
     assert decided(helm, time_s=53.0).state is State.IDLE
+
+
+def test_a_last_attempt_is_over_when_no_place_is_known_and_none_is_in_view():
+    for site, state in ((None, State.HOLD), (BELOW, State.AIMING)):
+        helm = Helm(LandingParameters(max_total_s=10.0, budget_policy='best_site'))
+        helm.engage()
+        decided(helm, site=None)
+        decision = decided(helm, time_s=11.0, revision=200, site=site, best=None)
+        assert decision.state is state
