@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, isfinite, pi
+from math import ceil, pi
 from typing import cast
 
 import cv2
@@ -189,12 +189,11 @@ def _site_at(ground: _Ground, north_m: float, east_m: float) -> Site:
     disc = layers.disc(north_m, east_m, max(radius, layers.cell_m))
     _, labels = cv2.connectedComponents(ground.safe.astype(np.uint8), connectivity=4)
     area = int(np.count_nonzero(labels == labels[cell])) * layers.cell_m**2
-    age = float(layers.age_s[cell])
     return Site(
         north_m=float(north_m),
         east_m=float(east_m),
         clearance_m=radius,
         area_m2=area,
         confidence=float(layers.score[disc].mean()),
-        age_s=age if isfinite(age) else 0.0,
+        age_s=float(layers.age_s[cell]),
     )

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Landings in wind with gusts: how far beside the site, how low, and whether it swings.
+"""Landings in wind with gusts: distance to the site, lowest altitude, and swing.
 
 ``python -m peace_ros.lab.evaluation.wind --seeds 12`` flies the landing core against the physics
 and the GUIDED mode of the simulated autopilot, in simulated time: wind leans the vehicle and its
@@ -36,7 +36,7 @@ from peace_ros.simulation.autopilot.physics import Physics
 ERROR_LIMIT_M = 1.5
 OVERSHOOT_LIMIT_M = 1.0
 SWING_LIMIT_M = 1.0
-"""Way to and fro of a vehicle that circles its site instead of coming to rest over it."""
+"""Distance to and fro of a vehicle that circles its site instead of hovering over it."""
 START_M = 60.0
 ISLAND_M = 12.0
 """Radius of the safe ground."""
@@ -47,9 +47,9 @@ _LINE_DELAY_S = 0.04
 _LATENCY_S = 0.3
 _LIMIT_S = 150.0
 _AFTER_S = 10.0
-"""Watched after the hand-over: gusts go on pushing."""
+"""Time observed after the hand-over, in which gusts go on."""
 _LAST_S = 10.0
-"""Of the descent, in which it has to be at rest over the site."""
+"""End of the descent, in which the vehicle must hover over the site."""
 _BOOT_S = 60.0
 _VELOCITY_AND_RATE = 0x5C7
 _LOCAL_NED = 1
@@ -127,7 +127,7 @@ class WindFlight:
 
     def run(self) -> Landed:
         """Fly until the landing is over, and a little longer."""
-        begin_s = over_s = self._now_s
+        begin_s = self._now_s
         outcome = None
         while outcome is None and self._now_s < begin_s + _LIMIT_S:
             self._tick()

@@ -240,3 +240,17 @@ def test_a_waypoint_is_reached_within_5_m_and_a_wide_spacing_stays_at_home():
     narrow = ExpandingSquare((10.0, 20.0), 30.0, 20.0)
     for north_m in (10.0, 40.0):
         assert narrow.target(Pose(0, north_m, 20.0, -60.0, LEVEL, 60.0)) == (10.0, 20.0)
+
+
+def test_a_square_far_from_the_origin_stays_around_its_home():
+    square, north, east = ExpandingSquare((-300.0, 500.0), 30.0, 100.0), -300.0, 500.0
+    for _ in range(12):
+        north, east = square.target(Pose(0, north, east, -60.0, LEVEL, 60.0))
+        assert hypot(north + 300.0, east - 500.0) <= 100.0
+    assert (north, east) != (-300.0, 500.0)
+
+
+def test_at_its_tolerance_beside_the_site_it_says_that_it_waits():
+    setpoint, note = velocity(State.LANDING, situation(30.0, offset_m=2.25), P)
+    assert setpoint.v_down_m_s == 0.0
+    assert note == '2.2 m beside the site: descends within 2.2 m'

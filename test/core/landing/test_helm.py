@@ -262,3 +262,143 @@ def test_zero_in_every_state_that_stands():
         trip = Trip(LandingParameters(giveup_after_s=60.0), state=state)
         command = trip.step(landed=True)
         assert command.setpoint.is_zero
+
+
+BELOW = Site(0.0, 0.0, 8.0, 200.0, 0.9, 0.2)
+
+
+def decided(helm, *, time_s=0.0, altitude_m=70.0, north_m=0.0, revision=100, **seen) -> Decision:
+    """One step with everything good over a site, but for what is given."""
+    now_ns = round((1000.0 + time_s) * 1e9)
+    pose = Pose(now_ns, north_m, 0.0, -altitude_m, LEVEL, altitude_m)
+    told = Telemetry(1, pose, armed=True, in_control=True, mode='GUIDED')
+    site = seen.pop('site', BELOW)
+    known = {
+        'verdict': Verdict.no_zone('none') if site is None else Verdict.found(site),
+        'reachable': site,
+        'ground_is_fresh': True,
+        'ground_score': 0.9,
+        'ground_age_s': 0.2,
+        'stamp_ns': now_ns,
+        'map_age_s': 0.2,
+        'revision': revision,
+        'threshold': 0.8,
+    }
+    return helm.decide(now_ns, told, 0.05, Sighting(**{**known, **seen}))
+
+
+def test_a_site_is_chosen_after_the_warm_up_counted_from_the_begin_of_the_state():
+    helm = Helm(LandingParameters())
+    helm.engage()
+    assert decided(helm, revision=100).state is State.SEARCHING
+    assert decided(helm, time_s=0.1, revision=104).state is State.SEARCHING
+    assert decided(helm, time_s=0.2, revision=105).state is State.AIMING
+    assert decided(helm, time_s=0.3, revision=106, site=None).state is State.WAITING
+    assert decided(helm, time_s=0.4, revision=110).state is State.WAITING
+    assert decided(helm, time_s=0.5, revision=111).state is State.AIMING
+
+
+@pytest.mark.parametrize(
+    ('changes', 'state'),
+    [
+        ({'altitude_m': 56.0}, State.LANDING),
+        ({'altitude_m': 56.1}, State.AIMING),
+        ({'altitude_m': 56.0, 'north_m': 6.5}, State.LANDING),
+        ({'altitude_m': 56.0, 'north_m': 6.6}, State.AIMING),
+        ({'altitude_m': 56.0, 'ground_is_fresh': False}, State.AIMING),
+    ],
+)
+def test_aiming_ends_low_enough_over_the_site_on_ground_just_seen(changes, state):
+    helm = Helm.engaged_in(LandingParameters(), State.AIMING)
+    assert decided(helm, **changes).state is state
+
+
+@pytest.mark.parametrize(
+    ('changes', 'state'),
+    [
+        ({'altitude_m': 20.3}, State.HANDOVER),
+        ({'altitude_m': 20.4}, State.LANDING),
+        ({'altitude_m': 20.3, 'north_m': 1.0}, State.HANDOVER),
+        ({'altitude_m': 20.3, 'north_m': 1.1}, State.LANDING),
+        ({'altitude_m': 20.3, 'ground_is_fresh': False}, State.LANDING),
+        ({'altitude_m': 20.3, 'site': None}, State.WAITING),
+        ({'altitude_m': 20.3, 'map_age_s': 2.1}, State.HOLD),
+    ],
+)
+def test_a_landing_ends_low_and_centred_on_ground_just_seen(changes, state):
+    helm = Helm.engaged_in(LandingParameters(), State.LANDING)
+    decision = decided(helm, **changes)
+    assert decision.state is state
+    assert decision.outcome == ('handover' if state is State.HANDOVER else None)
+
+
+def test_a_decision_tells_the_sighting_and_the_time_in_its_state():
+    helm = Helm(LandingParameters())
+    helm.engage()
+    decided(helm)
+    decision = decided(helm, time_s=2.5, site=None, threshold=0.7, map_age_s=0.4)
+    assert decision.time_in_state_s == pytest.approx(2.5)
+    assert decision.verdict.reason == 'none'
+    assert decision.site is None
+    assert (decision.effective_threshold, decision.map_age_s) == (0.7, 0.4)
+    assert decision.relaxed
+    assert decision.reason == 'engaged: searching; looking; threshold relaxed to 0.70'
+    firm = decided(helm, time_s=2.6, threshold=0.8)
+    assert not firm.relaxed
+    assert firm.reason == 'engaged: searching; looking'
+    assert firm.site is BELOW
+    helm.restart_clock(round(900e9))
+    assert decided(helm, time_s=-99.0).time_in_state_s == pytest.approx(1.0)
+
+
+def test_the_search_looks_first_and_then_flies():
+    helm = Helm(LandingParameters())
+    helm.engage()
+    for time_s, moves in ((0.0, False), (5.9, False), (6.0, True)):
+        decision = decided(helm, time_s=time_s, site=None)
+        assert (decision.setpoint.v_north_m_s > 0.0) is moves
+        assert decision.reason.endswith('expanding square') is moves
+
+
+@pytest.mark.parametrize(('north_m', 'state'), [(3.0, State.HOLD), (3.1, State.RETURNING)])
+def test_a_return_ends_within_3_m_of_where_the_landing_began(north_m, state):
+    helm = Helm(LandingParameters(max_total_s=10.0, budget_policy='return'))
+    helm.engage()
+    decided(helm, site=None)
+    decided(helm, time_s=9.0, north_m=50.0, site=None)
+    assert decided(helm, time_s=11.0, north_m=50.0, site=None).state is State.RETURNING
+    assert decided(helm, time_s=12.0, north_m=north_m, site=None).state is state
+
+
+@pytest.mark.parametrize(
+    ('fence_m', 'farthest_m'), [(0.0, 60.0), (70.0, 60.0), (64.0, 0.0), (3.0, 0.0)]
+)
+def test_the_square_turns_5_m_before_the_fence(fence_m, farthest_m):
+    helm = Helm(LandingParameters(geofence_radius_m=fence_m))
+    helm.engage()
+    for time_s in (0.0, 7.0, 8.0):
+        setpoint = decided(helm, time_s=time_s, site=None).setpoint
+    assert (setpoint.v_north_m_s > 0.0) is (farthest_m > 0.0)
+
+
+def test_a_disengaged_helm_counts_nothing_and_an_engaged_one_begins_at_its_first_position():
+    helm = Helm(LandingParameters(max_total_s=10.0))
+    for time_s in (0.0, 20.0, 40.0):
+        assert decided(helm, time_s=time_s).outcome is None
+    assert helm._home is None
+    helm.engage()
+    decided(helm, time_s=41.0, north_m=7.0)
+    decided(helm, time_s=42.0, north_m=9.0)
+    assert helm._home.north_m == 7.0
+    assert decided(helm, time_s=52.0).outcome == 'timeout'
+    helm.disengage()
+    assert decided(helm, time_s=53.0).state is State.IDLE
+
+
+def test_a_last_attempt_is_over_when_no_place_is_known_and_none_is_in_view():
+    for site, state in ((None, State.HOLD), (BELOW, State.AIMING)):
+        helm = Helm(LandingParameters(max_total_s=10.0, budget_policy='best_site'))
+        helm.engage()
+        decided(helm, site=None)
+        decision = decided(helm, time_s=11.0, revision=200, site=site, best=None)
+        assert decision.state is state

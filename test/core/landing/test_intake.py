@@ -124,3 +124,77 @@ def test_attitude_without_position_places_nothing(intake, safety_map):
     assert safety_map.stamp_ns == 2 * S
     assert intake.counts['pose rejected'] == 0
     assert intake.counts['used'] == 20
+
+
+def test_a_heatmap_waits_for_its_pose_no_longer_than_its_limit(intake):
+    intake.add_heatmap(heatmap_of(2.05))
+    for now_s, is_lost in ((2.1, False), (3.1, False), (3.2, True)):
+        intake.tick(round(now_s * S))
+        assert bool(intake.counts['no pose after its stamp']) is is_lost
+    assert intake.last_rejection == 'no pose after its stamp'
+
+
+def test_each_heatmap_has_its_own_wait(intake):
+    intake.add_heatmap(heatmap_of(2.05))
+    intake.tick(round(2.1 * S))
+    intake.add_heatmap(heatmap_of(2.06))
+    intake.tick(round(3.2 * S))
+    assert intake.counts['no pose after its stamp'] == 1, 'the second waits since now'
+    intake.tick(round(4.2 * S))
+    assert intake.counts['no pose after its stamp'] == 1
+    intake.tick(round(4.3 * S))
+    assert intake.counts['no pose after its stamp'] == 2
+
+
+def test_four_heatmaps_wait_and_the_oldest_makes_room(intake):
+    for number in range(1, 6):
+        intake.add_heatmap(heatmap_of(2.0 + 0.01 * number))
+    assert intake.counts['overtaken while it waited for a pose'] == 1
+    intake.add_pose(pose_of(2.1))
+    assert intake.counts['used'] == 24
+
+
+@pytest.mark.parametrize(('ahead_s', 'is_taken'), [(0.5, True), (0.51, False)])
+def test_a_stamp_may_lie_ahead_of_the_clock_up_to_the_tolerance(intake, ahead_s, is_taken):
+    intake.add_heatmap(heatmap_of(2.0 + ahead_s))
+    intake.add_pose(pose_of(2.0 + ahead_s))
+    assert (intake.counts['used'] == 21) is is_taken
+    assert (intake.counts['stamp in the future'] == 1) is not is_taken
+
+
+def test_a_heatmap_that_waits_ahead_of_a_clock_that_went_back_is_rejected(intake):
+    intake.add_heatmap(heatmap_of(2.4))
+    intake.tick(round(1.9 * S))
+    assert intake.counts['stamp in the future'] == 0
+    intake.tick(round(1.8 * S))
+    assert intake.counts['stamp in the future'] == 1
+
+
+def test_a_used_heatmap_ends_the_reason_of_a_dropped_map(intake):
+    intake.add_pose(pose_of(2.1, 15.0))
+    intake.add_pose(pose_of(2.2, 15.0))
+    assert intake.last_rejection.endswith('so the map was dropped')
+    intake.add_heatmap(heatmap_of(2.15))
+    assert intake.last_rejection == ''
+    intake.add_heatmap(heatmap_of(2.15))
+    assert intake.last_rejection == 'not newer than the last'
+
+
+def test_after_it_was_cleared_old_stamps_are_new_again(intake, safety_map):
+    intake.add_heatmap(heatmap_of(2.05))
+    intake.clear()
+    safety_map.clear()
+    intake.add_pose(pose_of(0.5))
+    intake.add_heatmap(heatmap_of(0.5))
+    assert intake.counts['used'] == 21
+    assert safety_map.stamp_ns == S // 2
+
+
+@pytest.mark.parametrize(
+    ('value', 'fate'), [(1.01, 'values outside of 0 to 1'), (nan, 'not finite')]
+)
+def test_values_that_are_no_safety_are_rejected(intake, value, fate):
+    intake.add_pose(pose_of(2.1))
+    intake.add_heatmap(heatmap_of(2.1, value))
+    assert intake.counts[fate] == 1
+    assert intake.last_rejection == fate

@@ -114,3 +114,10 @@ def test_doubt_weighs_squared_as_in_the_choice_of_a_site():
     memory.see(site(0.0, 10.0, 0.9))
     memory.see(site(50.0, 12.0, 0.8))
     assert memory.best().north_m == 0.0
+
+
+def test_a_failure_at_the_same_place_and_of_the_same_radius_takes_its_place():
+    memory = SiteMemory(LandingParameters(failed_site_growth=1.0))
+    for _ in range(2):
+        memory.fail(site(0.0, 10.0), 0)
+    assert [each.failures for each in memory.failed] == [2]

@@ -303,3 +303,31 @@ def test_a_cell_is_an_obstacle_below_one_half_whatever_surrounds_it(score, is_sa
     layers.score[100, 100] = score
     assert safe_ground(layers, 0.8, 10.0, 3)[100, 100] == is_safe
     assert safe_ground(layers, 0.8, 10.0, 3)[100, 102]
+
+
+def test_unsafe_ground_has_no_clearance_and_the_cell_beside_it_a_half_cell():
+    safe = np.zeros((9, 9), dtype=bool)
+    safe[:, 4:] = True
+    assert clearance(safe, 0.5)[4].tolist() == pytest.approx(
+        [0, 0, 0, 0, 0.25, 0.75, 1.25, 0.75, 0.25]
+    )
+
+
+def test_says_when_only_places_that_failed_are_left():
+    failed = (FailedPlace(0.0, 0.0, 20.0, 0),)
+    verdict = find_site(layers_with((0.0, 0.0, 8.0)), replace(SEARCH, failed=failed), P)
+    assert verdict.reason == (
+        'the widest safe ground has 0.0 m of clearance and 3.0 m are needed, '
+        'sites that failed left out'
+    )
+
+
+@pytest.mark.parametrize(('beside_m', 'north_wins'), [(2.0, True), (5.5, False)])
+def test_confidence_counts_as_far_around_as_the_clearance_that_is_needed(beside_m, north_wins):
+    """The southern of two lawns is nearer, but has doubtful ground on both sides of its middle."""
+    layers = layers_with((-24.25, 0.25, 9.0), (25.25, 0.25, 9.0))
+    for sign in (-1.0, 1.0):
+        doubtful = layers.disc(-24.25, 0.25 + sign * beside_m, 1.2)
+        layers.score[doubtful] = np.minimum(layers.score[doubtful], 0.83)
+    site = find_site(layers, SEARCH, P).site
+    assert (site.north_m > 0.0) is north_wins

@@ -62,8 +62,8 @@ def _let_pass(_guard, wish, _given):
 @pytest.mark.parametrize(
     ('rule', 'promise'),
     [
-        ('_ground', 'over ground that is not safe'),
-        ('_ages', 'without a fresh map'),
+        ('_descent', 'over ground that is not safe'),
+        ('_descent', 'without a fresh map'),
         ('_fence', 'beyond the fence'),
     ],
 )
@@ -89,5 +89,5 @@ def test_the_command_reports_and_ends_with_the_verdict(tmp_path, capsys, monkeyp
     assert main(['--sequences', '30', '--json', str(target)]) == 0
     assert '0 promises broken' in capsys.readouterr().out
     assert json.loads(target.read_text())['moments'] == 360
-    monkeypatch.setattr(Guard, '_ground', _let_pass)
+    monkeypatch.setattr(Guard, '_descent', _let_pass)
     assert main(['--sequences', '2000']) == 1
