@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, pi
 from typing import cast
 
@@ -114,8 +114,11 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
             + (', sites that failed left out' if search.failed else '')
         )
     preferred = wide & (ground.clearance_m >= p.preferred_clearance_m)
-    value = worth(_merits(ground, search, inside), p)
-    best = _highest(value, preferred if preferred.any() else wide)
+    candidates = preferred if preferred.any() else wide
+    merits = _merits(ground, search)
+    best = _highest(worth(_with_shapes(merits, candidates, layers.cell_m), p), candidates)
+    # Shapes stay out of this comparison: pieces of ground merge and split from frame to frame.
+    value = worth(merits, p)
     kept_cell = None if kept is None else layers.cell_at(*kept)
     if kept is None or kept_cell is None or value[best] >= p.site_hysteresis * value[kept_cell]:
         kept = layers.centre_of(*best)
@@ -128,27 +131,32 @@ def _highest(value: NDArray[np.float32], candidates: NDArray[np.bool_]) -> tuple
     return cast('tuple[int, int]', np.unravel_index(index, value.shape))
 
 
-def _merits(ground: _Ground, search: Search, inside: NDArray[np.bool_]) -> Merits:
-    """Return the merits of every cell, as seen from the vehicle.
-
-    Shapes are those of the connected ground with enough clearance to keep a site, so that the
-    present choice and its rivals are measured alike.
-    """
-    layers = ground.layers
-    usable = inside & (ground.clearance_m >= _KEEP_FRACTION * search.required_clearance_m)
-    _, labels = cv2.connectedComponents(usable.astype(np.uint8), connectivity=4)
-    inner = cv2.erode(usable.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    area = np.bincount(labels.ravel())
-    rim = np.maximum(np.bincount(labels[usable & ~inner], minlength=area.size), 1)
-    compactness = np.minimum(1.0, 4.0 * pi * area / (rim * rim))
-    size = 2 * ceil(search.required_clearance_m / layers.cell_m) + 1
-    confidence = cv2.blur(layers.score, (size, size), borderType=cv2.BORDER_REPLICATE)
+def _merits(ground: _Ground, search: Search) -> Merits:
+    """Return the merits of every cell by itself, as seen from the vehicle."""
+    layers, radius_m = ground.layers, search.required_clearance_m
+    reach = ceil(radius_m / layers.cell_m)
+    offset_m = np.arange(-reach, reach + 1) * layers.cell_m
+    disc = np.add.outer(offset_m**2, offset_m**2) <= radius_m**2
+    mean = disc.astype(np.float32) / np.float32(disc.sum())
+    confidence = cv2.filter2D(layers.score, -1, mean, borderType=cv2.BORDER_REPLICATE)
     return Merits(
         clearance_m=ground.clearance_m,
         confidence=cast('NDArray[np.float32]', confidence),
-        half_width_m=(area / rim * layers.cell_m).astype(np.float32)[labels],
-        compactness=compactness.astype(np.float32)[labels],
         distance_m=np.hypot(*layers.distances_m(search.pose.north_m, search.pose.east_m)),
+    )
+
+
+def _with_shapes(merits: Merits, candidates: NDArray[np.bool_], cell_m: float) -> Merits:
+    """Return the merits with the shape of the connected piece of candidates around each cell."""
+    _, labels = cv2.connectedComponents(candidates.astype(np.uint8), connectivity=4)
+    inner = cv2.erode(candidates.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    area = np.bincount(labels.ravel())
+    rim = np.maximum(np.bincount(labels[candidates & ~inner], minlength=area.size), 1)
+    compactness = np.minimum(1.0, 4.0 * pi * area / (rim * rim))
+    return replace(
+        merits,
+        half_width_m=(area / rim * cell_m).astype(np.float32)[labels],
+        compactness=compactness.astype(np.float32)[labels],
     )
 
 

@@ -201,11 +201,14 @@ def test_a_rival_must_be_worth_the_hysteresis_times_the_present_choice(hysteresi
     assert (site.east_m > 0.0) is stays
 
 
-def test_a_rival_is_measured_with_the_shape_of_its_ground_too():
-    """A choice in the middle of a lawn is not given up for a long strip of its width."""
-    layers = layers_of_boxes((0.0, 25.0, 15.0, 60.0), (0.0, -32.0, 30.0, 30.0))
-    search = replace(SEARCH, incumbent=Site(0.0, 25.0, 7.0, 900.0, 0.95, 0.0))
-    assert find_site(layers, search, P).site.east_m < 0.0
+def test_shape_ranks_new_places_but_is_no_reason_to_leave_the_present_one():
+    """Pieces of ground merge and split from frame to frame; both places are equally wide here."""
+    layers = layers_of_boxes((0.0, 25.0, 14.0, 40.0), (0.0, -28.0, 30.0, 30.0))
+    alike = replace(P, ample_clearance_m=6.0, distance_scale_m=1000.0)
+    lawn = find_site(layers, SEARCH, alike).site
+    assert lawn.east_m < 0.0
+    search = replace(SEARCH, incumbent=Site(0.0, 25.0, 6.0, 500.0, 0.95, 0.0))
+    assert find_site(layers, search, alike).site.east_m > 0.0
 
 
 def test_a_choice_is_kept_down_to_85_percent_of_the_clearance_it_needs():
