@@ -7,17 +7,14 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from peace_ros.core.domain import BundleError
 from peace_ros.core.inference.manifest import FileEntry, InputSpec, Manifest, parse_manifest
 from peace_ros.core.resources import models_dir
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 __all__ = ['MANIFEST_NAME', 'Bundle', 'FileEntry', 'InputSpec', 'Manifest']
 

@@ -4,16 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from peace_ros.core.domain import BundleError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from peace_ros.core.inference.manifest import Manifest
+from peace_ros.core.inference.manifest import Manifest
 
 PIXEL_VALUES = 'pixel_values'
 IMAGE_EMBEDDING = 'image_embedding'

@@ -4,18 +4,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 from peace_ros.core.domain import ImageError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from peace_ros.core.inference.manifest import InputSpec
+from peace_ros.core.inference.manifest import InputSpec
 
 MAX_PIXELS = 64_000_000
 """Larger images are refused: cameras do not take them, and they would stall everything else."""

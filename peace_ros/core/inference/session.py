@@ -5,25 +5,21 @@
 from __future__ import annotations
 
 import mmap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
+import numpy as np
 import onnxruntime as ort
+from numpy.typing import NDArray
 from onnxruntime.capi import onnxruntime_pybind11_state as ort_state
 
 from peace_ros.core.domain import BundleError, ConfigurationError
+from peace_ros.core.inference.bundle import Bundle
 from peace_ros.core.inference.contract import Graph, Tensor, check_graphs
 from peace_ros.core.inference.openvino_engine import OpenVinoEngine
 from peace_ros.core.inference.providers import CPU, OPENVINO, check_providers, with_options
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from peace_ros.core.inference.bundle import Bundle
 
 DEFAULT_PROVIDERS = (CPU,)
 OPTIMISATIONS = MappingProxyType(

@@ -7,20 +7,17 @@ from __future__ import annotations
 import html
 import logging
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import ftfy
 import numpy as np
 import tokenizers
+from numpy.typing import NDArray
 
 from peace_ros.core.domain import BundleError, ConfigurationError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
 
 END_OF_WORD = '</w>'
 """How CLIP's byte-pair encoding marks the end of a word; no other tokenizer here does."""

@@ -5,18 +5,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from peace_ros.core.domain import ImageError
+from peace_ros.core.inference.manifest import InputSpec
 from peace_ros.core.inference.preprocess import MAX_PIXELS
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from peace_ros.core.inference.manifest import InputSpec
 
 BORDER_LEVEL = 114
 """Grey of the borders that the YOLO family is trained with."""
