@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import ConfigurationError, Frame, Heatmap, Prompt
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 from peace_ros.core.inference import Preprocessor
 from peace_ros.core.inference.contract import IS_POSITIVE, PIXEL_VALUES, TERM_LOGITS, TEXT_EMBEDDING
 from peace_ros.core.segmentation.fusion import calibrated
@@ -31,7 +31,7 @@ _ROUNDING = 1e-3
 
 
 @dataclass(frozen=True)
-class ClipSegParameters:
+class ClipSegParameters(ParameterSet):
     """Parameters of the family clipseg."""
 
     clipseg_max_looks: int = parameter(
@@ -41,9 +41,6 @@ class ClipSegParameters:
         low=1,
         high=101,
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class ClipSegSegmenter(BundleSegmenter):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 from peace_ros.core.inference import Bundle, TextEncoder, open_sessions
 from peace_ros.core.inference.providers import Footprint, LoadMeter
 from peace_ros.core.segmentation.fusion import FUSIONS
@@ -24,7 +24,7 @@ BundleOrName = Bundle | Path | str
 
 
 @dataclass(frozen=True)
-class SegmentationParameters:
+class SegmentationParameters(ParameterSet):
     """Parameters of the segmentation, whatever the family of its model."""
 
     family: str = parameter('clipseg', 'Family of the segmentation model: clipseg or fastsam')
@@ -47,9 +47,6 @@ class SegmentationParameters:
     cache_dir: str = parameter(
         '', 'Folder that keeps text embeddings for the next start; empty keeps them in memory only'
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Segmenter(Protocol):
