@@ -30,7 +30,6 @@ from peace_ros.core.segmentation.fastsam.scoring import is_usable, term_shares
 from peace_ros.core.segmentation.fastsam.selection import Selection, select
 from peace_ros.core.segmentation.fusion import calibrated
 from peace_ros.core.segmentation.segmenter import (
-    BundleOrName,
     BundleSegmenter,
     SegmentationParameters,
 )
@@ -56,39 +55,17 @@ class FastSamSegmenter(BundleSegmenter):
     ROLES = ('segmenter', 'image_encoder', 'text_encoder')
     MEASURED_WITH = 'softmax'
 
-    def __init__(
-        self,
-        bundle: BundleOrName,
-        terms: Terms,
-        parameters: SegmentationParameters,
-        own: FastSamParameters | None = None,
-    ) -> None:
-        """Open the bundle's graphs and run them once.
-
-        Args:
-            bundle: of the family ``fastsam``.
-            terms: what to look for.
-            parameters: of the segmentation; its bundle and terms are those given here.
-            own: of the family; None: as they are declared.
-
-        Raises:
-            BundleError: the bundle is of another family or its graphs do not fit it.
-            ConfigurationError: an execution provider is not available, or there is no negative
-                term.
-        """
+    def _check_terms(self, terms: Terms, parameters: SegmentationParameters) -> None:  # noqa: ARG002
         if not terms.negative:
             raise ConfigurationError(
                 'family fastsam without negative terms would call every segment safe, because '
                 'the terms share each segment among them: name negative terms or choose clipseg'
             )
-        super().__init__(bundle, terms, parameters)
+
+    def _warm_up(self, own: FastSamParameters | None) -> None:
         self._own = own or FastSamParameters()
         self._letterbox = Letterbox(self._manifest.input)
         self._cutter = Cutter(self._manifest.encoder_input, self._own.fastsam_max_segments)
-        self._warm_up()
-        self._loaded()
-
-    def _warm_up(self) -> None:
         size = self._manifest.input
         pixels, _ = self._letterbox(np.zeros((size.height, size.width, 3), np.uint8))
         predictions, prototypes = self._sessions['segmenter'].warm_up(
@@ -125,7 +102,7 @@ class FastSamSegmenter(BundleSegmenter):
         networks that cannot be used.
         """
         painted = self._paint(frame, prompt)
-        safety = calibrated(painted.safety, self._threshold)
+        safety = calibrated(painted.safety, self.threshold)
         return Heatmap(safety[painted.labels], frame.stamp_ns)
 
     def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
