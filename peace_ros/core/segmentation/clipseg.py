@@ -16,10 +16,7 @@ from peace_ros.core.inference import Preprocessor
 from peace_ros.core.inference.contract import IS_POSITIVE, PIXEL_VALUES, TERM_LOGITS, TEXT_EMBEDDING
 from peace_ros.core.segmentation.fusion import calibrated
 from peace_ros.core.segmentation.looks import joined, parts_of
-from peace_ros.core.segmentation.segmenter import (
-    BundleSegmenter,
-    SegmentationParameters,
-)
+from peace_ros.core.segmentation.segmenter import BundleSegmenter, SegmentationParameters
 from peace_ros.core.segmentation.terms import Terms
 
 Image = NDArray[np.uint8]
