@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from peace_ros.core.inference import InputSpec
+from peace_ros.core.inference.manifest import InputSpec
 from peace_ros.core.segmentation.fastsam.letterbox import Letterbox, Placement, fitted
 from peace_ros.core.segmentation.fastsam.masks import Detections, Segment, assemble, detect
 
