@@ -8,14 +8,14 @@ import numpy as np
 
 import peace_ros.core.segmentation as seg
 from peace_ros.core.domain import Heatmap
-from peace_ros.core.domain.parameters import parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 from peace_ros.core.pipeline import Pipeline, create_generator
 from peace_ros.core.prompting import PromptingParameters
 from peace_ros.simulation.world import draw_world
 
 
 @dataclass(frozen=True)
-class GreenParameters:
+class GreenParameters(ParameterSet):
     green_gain: float = parameter(4.0, 'Score per share of green', low=0.1, high=100.0)
 
 

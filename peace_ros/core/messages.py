@@ -9,19 +9,22 @@ whatever classes it is given. Stamps are carried over, never renewed.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from math import isfinite, sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import DepthImage, Frame, Heatmap, ImageError, Pose, Prompt
+from peace_ros.core.domain import DepthImage, Frame, Heatmap, ImageError, Pose, Prompt, VehicleError
+from peace_ros.core.domain.geometry import attitude_enu_flu_to_ned_frd, enu_to_ned
 from peace_ros.core.images import jpeg_from_rgb, pixels_from_raw, rgb_from_message
-from peace_ros.core.poses import pose_from_enu_flu
 from peace_ros.core.prompting.pairs import prompt_from_pairs
 
 NANOSECONDS = 1_000_000_000
 CAMERA_FRAME = 'camera'
 _FLOAT_BYTES = 4
+_LENGTHS = (0.9, 1.1)
+"""Between which a quaternion's length counts as rounding; beyond, it is no rotation."""
 
 
 def ns_from_time(stamp: Any) -> int:
@@ -84,13 +87,39 @@ def pose_from_message(message: Any) -> Pose:
     """
     pose = message.pose
     pose = pose.pose if hasattr(pose, 'pose') else pose
-    return pose_from_enu_flu(stamp_ns_of(message), pose.position, pose.orientation)
+    return _pose_from_enu_flu(stamp_ns_of(message), pose.position, pose.orientation)
 
 
 def pose_from_transform(transform: Any) -> Pose:
     """Return the pose of a tf transform local frame -> vehicle, as :func:`pose_from_message`."""
     body = transform.transform
-    return pose_from_enu_flu(stamp_ns_of(transform), body.translation, body.rotation)
+    return _pose_from_enu_flu(stamp_ns_of(transform), body.translation, body.rotation)
+
+
+def _pose_from_enu_flu(stamp_ns: int, position: Any, orientation: Any) -> Pose:
+    """Return the pose (NED, FRD) of a position in ENU and an attitude FLU in ENU (REP-103).
+
+    The ground is taken to be at z = 0.
+
+    Args:
+        stamp_ns: of the message.
+        position: has x, y and z in metres: Point or Vector3.
+        orientation: has w, x, y and z: Quaternion.
+
+    Raises:
+        VehicleError: a value is not finite or the quaternion is not of unit length.
+    """
+    enu = float(position.x), float(position.y), float(position.z)
+    turn = tuple(float(getattr(orientation, each)) for each in 'wxyz')
+    length = sqrt(sum(each * each for each in turn))
+    if not all(map(isfinite, (*enu, *turn))) or not _LENGTHS[0] < length < _LENGTHS[1]:
+        raise VehicleError(
+            f'pose {enu} with quaternion {turn} (length {length:.2f}) at {stamp_ns} ns: it must '
+            'be in finite metres with a quaternion of length 1'
+        )
+    w, x, y, z = (each / length for each in turn)
+    north, east, down = enu_to_ned(*enu)
+    return Pose(stamp_ns, north, east, down, attitude_enu_flu_to_ned_frd((w, x, y, z)), -down)
 
 
 def diagnostic_values(message: Any) -> dict[str, str]:

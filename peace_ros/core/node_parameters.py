@@ -13,7 +13,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from peace_ros.core.domain import Camera, ConfigurationError
-from peace_ros.core.domain.parameters import ParameterInfo, check, describe, parameter
+from peace_ros.core.domain.parameters import ParameterInfo, ParameterSet, describe, parameter
 
 Group = tuple[str, type[Any]]
 """Prefix of the ROS names (empty for none) and the dataclass behind them."""
@@ -26,19 +26,16 @@ _TRANSPORTS = ('raw', 'compressed')
 
 
 @dataclass(frozen=True)
-class PromptGeneratorOptions:
+class PromptGeneratorOptions(ParameterSet):
     """Options of the prompt_generator node."""
 
     image_transport: str = parameter(
         'raw', 'Take image (raw) or image/compressed (JPEG, PNG)', choices=_TRANSPORTS
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True)
-class SegmentationOptions:
+class SegmentationOptions(ParameterSet):
     """Options of the segmentation node."""
 
     image_transport: str = parameter(
@@ -62,12 +59,9 @@ class SegmentationOptions:
     )
     overlay_quality: int = parameter(80, 'JPEG quality of the overlay', low=1, high=100)
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True)
-class CameraOptions:
+class CameraOptions(ParameterSet):
     """The nadir camera, as both its simulation and the landing see it."""
 
     camera_width: int = parameter(352, 'Width of the image', unit='px', low=16, high=8192)
@@ -76,9 +70,6 @@ class CameraOptions:
         73.0, 'Full horizontal field of view; pixels are square', unit='deg', low=5.0, high=150.0
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
     @property
     def camera(self) -> Camera:
         """The camera that the options describe."""
@@ -86,7 +77,7 @@ class CameraOptions:
 
 
 @dataclass(frozen=True)
-class LandingOptions:
+class LandingOptions(ParameterSet):
     """Options of the landing node."""
 
     interface: str = parameter(
@@ -126,9 +117,6 @@ class LandingOptions:
     )
     tf_parent: str = parameter('map', 'Local frame (ENU) of the pose in tf')
     tf_child: str = parameter('base_link', 'Frame of the vehicle in tf')
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 def groups_of(node: str) -> tuple[Group, ...]:

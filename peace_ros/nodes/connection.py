@@ -6,31 +6,20 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Generic, Protocol, TypeVar
 
 from peace_ros.core.domain import VehicleError
 from peace_ros.core.threads import GuardedThread, OnDefect
+from peace_ros.core.vehicle import VehicleLink
 
 _RETRY_S = 1.0
 _JOIN_S = 1.0
 
 
-class Closable(Protocol):
-    """Anything that holds a line."""
-
-    def close(self) -> None:
-        """Release it."""
-        ...
-
-
-_Link = TypeVar('_Link', bound=Closable)
-
-
-class Connection(Generic[_Link]):
+class Connection:
     """Opens a link in a thread, and tries again until it is open."""
 
     def __init__(
-        self, open_link: Callable[[], _Link], say: Callable[[str], None], on_defect: OnDefect
+        self, open_link: Callable[[], VehicleLink], say: Callable[[str], None], on_defect: OnDefect
     ) -> None:
         """Begin to open.
 
@@ -43,13 +32,13 @@ class Connection(Generic[_Link]):
         self._open, self._say = open_link, say
         self._lock = threading.Lock()
         self._stop = threading.Event()
-        self._link: _Link | None = None
+        self._link: VehicleLink | None = None
         self._problem = 'the autopilot has not been heard yet'
         self._thread = GuardedThread(self._run, 'connection', on_defect)
         self._thread.start()
 
     @property
-    def link(self) -> _Link | None:
+    def link(self) -> VehicleLink | None:
         """The link once it is open."""
         with self._lock:
             return self._link

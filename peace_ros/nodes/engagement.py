@@ -5,40 +5,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, cast
+from typing import TYPE_CHECKING
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from peace_ros.core.domain import VehicleError
 from peace_ros.core.threads import GuardedThread
 from peace_ros.core.vehicle import VehicleLink
+from peace_ros.nodes.vehicle_access import VehicleAccess
+
+if TYPE_CHECKING:
+    from peace_ros.nodes.landing import LandingNode
 
 _JOIN_S = 2.0
-
-
-class Engageable(Protocol):
-    """What the services need of the node; it is an rclpy Node besides."""
-
-    def check_engagement(self) -> str:
-        """Return why a landing cannot begin now, empty when it can."""
-
-    def link(self) -> VehicleLink | None:
-        """Return the vehicle, None until it is reached."""
-
-    def begin(self) -> str:
-        """Begin the landing; return why it cannot begin, empty when it began."""
-
-    def hold_level(self) -> str:
-        """Hold level without a position where that was chosen; return the result in words."""
-
-    def end_landing(self) -> bool:
-        """End the landing; return whether one was under way."""
-
-    def fail(self, error: BaseException) -> None:
-        """Take what ended a thread."""
 
 
 class EngagementServices:
@@ -48,14 +29,13 @@ class EngagementServices:
     thread of its own, and the services have a callback group in which one waits for the other.
     """
 
-    def __init__(self, node: Engageable, *, auto: bool) -> None:
-        self._node = node
+    def __init__(self, node: LandingNode, access: VehicleAccess, *, auto: bool) -> None:
+        self._node, self._access = node, access
         self._auto_due = auto
-        self._ros = cast('Node', node)
         self._thread: GuardedThread | None = None
         beside = MutuallyExclusiveCallbackGroup()
         for name, callback in (('engage', self._on_engage), ('disengage', self._on_disengage)):
-            self._ros.create_service(Trigger, f'~/{name}', callback, callback_group=beside)
+            self._node.create_service(Trigger, f'~/{name}', callback, callback_group=beside)
 
     def engage_when_ready(self) -> None:
         """Engage once, in a thread, when that was asked for and a landing can begin."""
@@ -83,20 +63,20 @@ class EngagementServices:
 
     def _engage_for_person(self) -> str:
         problem = self._engage(by_person=True)
-        instead = self._node.hold_level() if problem else ''
+        instead = self._access.hold_level() if problem else ''
         return f'{problem}; {instead}' if instead else problem
 
     def _engage(self, *, by_person: bool) -> str:
         """Request control once; return why the landing did not begin, empty when it began."""
-        link = self._node.link()
         problem = self._node.check_engagement()
+        link = self._access.link
         if not problem and link is not None:
             problem = _request_control(link, by_person=by_person)
         problem = problem or self._node.begin()
         if problem:
-            self._ros.get_logger().warning(f'not engaged: {problem}')
+            self._node.get_logger().warning(f'not engaged: {problem}')
         else:
-            self._ros.get_logger().info('engaged')
+            self._node.get_logger().info('engaged')
         return problem
 
     def _on_disengage(
@@ -106,7 +86,7 @@ class EngagementServices:
         was_flying = self._node.end_landing()
         response.success = True
         response.message = 'disengaged: the vehicle stops and holds' if was_flying else 'was idle'
-        self._ros.get_logger().info(response.message)
+        self._node.get_logger().info(response.message)
         return response
 
 

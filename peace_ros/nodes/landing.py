@@ -24,7 +24,7 @@ from peace_ros.core.landing import (
 )
 from peace_ros.core.mapping import MapParameters
 from peace_ros.core.node_parameters import CameraOptions, LandingOptions, groups_of
-from peace_ros.core.vehicle import SenderParameters, SetpointSender, VehicleLink, VehicleParameters
+from peace_ros.core.vehicle import SenderParameters, SetpointSender, VehicleParameters
 from peace_ros.nodes.engagement import EngagementServices
 from peace_ros.nodes.inputs import LandingInputs
 from peace_ros.nodes.runtime import PeaceNode, run
@@ -56,7 +56,7 @@ class LandingNode(PeaceNode):
         self._publisher = DecisionPublisher(self)
         self._access = VehicleAccess(self, self._options, self.filled(VehicleParameters))
         self._inputs = LandingInputs(self, self._options)
-        self._engagement = EngagementServices(self, auto=self._options.auto_engage)
+        self._engagement = EngagementServices(self, self._access, auto=self._options.auto_engage)
         # A ROS-time timer would stand still with a clock that stops or jumps.
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0 / self._options.rate, self._step, clock=self._steady)
@@ -111,14 +111,6 @@ class LandingNode(PeaceNode):
             return self._access.vehicle_problem or engagement_problem(
                 self._state, told, age_s, map_age_s, self._landing
             )
-
-    def link(self) -> VehicleLink | None:
-        """Return the vehicle, None until it is reached."""
-        return self._access.link
-
-    def hold_level(self) -> str:
-        """Hold level where there is no position and that was chosen; return the result."""
-        return self._access.hold_level()
 
     def begin(self) -> str:
         """Begin the landing of a vehicle that obeys; return what speaks against it, or nothing."""

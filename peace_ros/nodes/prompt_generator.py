@@ -15,11 +15,7 @@ from peace_ros.core.domain import PeaceError
 from peace_ros.core.messages import frame_from_message
 from peace_ros.core.node_parameters import PromptGeneratorOptions, groups_of
 from peace_ros.core.pipeline import create_generator
-from peace_ros.core.prompting import (
-    PromptGenerator,
-    PromptingParameters,
-    resolve_template,
-)
+from peace_ros.core.prompting import PromptGenerator, PromptingParameters, resolve_template
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
 from peace_ros.nodes.messages import ERROR, OK, diagnostic_array, prompt_to_message
 from peace_ros.nodes.qos import RESULT

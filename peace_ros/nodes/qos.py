@@ -8,40 +8,27 @@ best-effort images larger than its shared-memory segment (about 549 kB); ``confi
 enlarges the segment of the process that publishes them.
 """
 
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-IMAGE_OUT = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.RELIABLE
-)
+# A profile with a depth is keep-last, reliable and volatile where it does not say otherwise.
+
+IMAGE_OUT = QoSProfile(depth=1)
 """Frames, heatmaps and overlays that we publish."""
 
-IMAGE_IN = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.BEST_EFFORT
-)
+IMAGE_IN = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Frames and heatmaps that we take; the oldest is dropped."""
 
-POSE = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=20, reliability=ReliabilityPolicy.RELIABLE)
+POSE = QoSProfile(depth=20)
 """Poses: each counts, since a heatmap is projected with the pose at its stamp."""
 
-POSE_IN = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=20, reliability=ReliabilityPolicy.BEST_EFFORT
-)
+POSE_IN = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Poses that we subscribe to, whatever reliability they are offered with."""
 
-RESULT = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.RELIABLE
-)
+RESULT = QoSProfile(depth=10)
 """Prompts, status, sites, set-points, diagnostics."""
 
-COMMAND = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.RELIABLE
-)
+COMMAND = QoSProfile(depth=1)
 """Velocity commands: only the newest has a meaning."""
 
-CLOCK = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1,
-    reliability=ReliabilityPolicy.BEST_EFFORT,
-    durability=DurabilityPolicy.VOLATILE,
-)
+CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """/clock, as rclpy subscribes to it."""

@@ -23,6 +23,13 @@ _NO_MODES = RequestResult(Answer.REFUSED, 'a vehicle with a velocity topic has n
 class TwistLink:
     """A VehicleLink that always obeys: there is no pilot and no mode in such a simulator."""
 
+    taken_over = False
+    """Nobody else commands."""
+    problem = ''
+    """Nothing: a topic is always there, and the age of the pose is looked at elsewhere."""
+    position_problem = ''
+    """Nothing."""
+
     def __init__(self, publish: Callable[[Twist], None]) -> None:
         self._publish = publish
         self._lock = threading.Lock()
@@ -35,21 +42,6 @@ class TwistLink:
         with self._lock:
             self._poses.append(pose)
             self._newest, self._received_ns = pose, time.monotonic_ns()
-
-    @property
-    def taken_over(self) -> bool:
-        """Nobody else commands."""
-        return False
-
-    @property
-    def problem(self) -> str:
-        """Nothing: a topic is always there, and the age of the pose is looked at elsewhere."""
-        return ''
-
-    @property
-    def position_problem(self) -> str:
-        """Nothing."""
-        return ''
 
     def telemetry(self) -> Telemetry:
         """Return the newest pose as telemetry of an armed, obedient, flying vehicle."""
@@ -103,9 +95,7 @@ class TwistLink:
         """Refuse: such a vehicle has no modes."""
         return _NO_MODES
 
-    def request_level_hold(self) -> RequestResult:
-        """Refuse: such a vehicle has no modes."""
-        return _NO_MODES
+    request_level_hold = request_land
 
     def stop_at_once(self) -> bool:
         """Stop the vehicle."""

@@ -55,7 +55,7 @@ class VehicleAccess:
         self._after = AfterHandover(
             parameters.after_handover, lambda sentence: node.say('handover', sentence), node.fail
         )
-        self._connection: Connection[VehicleLink] | None = None
+        self._connection: Connection | None = None
         self._twist: TwistLink | None = None
         if options.interface == 'twist':
             self.name = 'topics pose and cmd_vel'

@@ -148,13 +148,12 @@ def break_after_handover(fail: Callable[[BaseException], None], _bench: Any) -> 
 def break_engagement(fail: Callable[[BaseException], None], bench: Any) -> None:
     class Flown(type(bench.peer)):  # type: ignore[misc]
         check_engagement = staticmethod(raise_defect)
-        link = staticmethod(lambda: None)
 
         def fail(self, error: BaseException) -> None:
             fail(error)
 
     node = Flown('flown')
-    EngagementServices(node, auto=False)
+    EngagementServices(node, None, auto=False)
     bench.spin(node)
     client = bench.peer.create_client(Trigger, '/flown/engage')
     bench.until(client.service_is_ready)

@@ -13,7 +13,7 @@ import yaml
 from rclpy.parameter import Parameter
 
 from peace_ros.core.domain import ConfigurationError
-from peace_ros.core.domain.parameters import check, describe, parameter
+from peace_ros.core.domain.parameters import ParameterSet, describe, parameter
 from peace_ros.core.node_parameters import named
 from peace_ros.lab.parameter_docs import (
     NODE_PARAMETERS,
@@ -28,15 +28,12 @@ PRESETS = ROOT / 'config' / 'presets'
 
 
 @dataclass(frozen=True)
-class Sample:
+class Sample(ParameterSet):
     speed: float = parameter(1.5, 'Speed over ground', unit='m/s', low=0.0, high=5.0)
     count: int = parameter(3, 'How many', low=1)
     name: str = parameter('a', 'Which one', choices=('a', 'b'))
     active: bool = parameter(default=False, description='Whether')
     providers: tuple[str, ...] = parameter(('x', 'y'), 'In order')
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 def node_with(**values: object) -> PeaceNode:

@@ -61,20 +61,23 @@ def describe(parameters: type[Any] | Any) -> tuple[ParameterInfo, ...]:
     return tuple(infos)
 
 
-def check(parameters: Any) -> None:
-    """Raise ConfigurationError when a value lies outside its bounds; call it in __post_init__."""
-    for info in describe(parameters):
-        value = getattr(parameters, info.name)
-        if info.choices and value not in info.choices:
-            raise ConfigurationError(
-                f'parameter {info.name} = {value!r}: choose one of {", ".join(info.choices)}'
-            )
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            continue
-        below = info.low is not None and not value >= info.low
-        above = info.high is not None and not value <= info.high
-        if below or above or isnan(value):
-            raise ConfigurationError(
-                f'parameter {info.name} = {value} {info.unit}'.rstrip()
-                + f': must lie between {info.low} and {info.high}'
-            )
+class ParameterSet:
+    """What dataclasses of parameters inherit: a value outside its bounds is refused at once."""
+
+    def __post_init__(self) -> None:
+        """Raise ConfigurationError when a value lies outside its bounds."""
+        for info in describe(self):
+            value = getattr(self, info.name)
+            if info.choices and value not in info.choices:
+                raise ConfigurationError(
+                    f'parameter {info.name} = {value!r}: choose one of {", ".join(info.choices)}'
+                )
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                continue
+            below = info.low is not None and not value >= info.low
+            above = info.high is not None and not value <= info.high
+            if below or above or isnan(value):
+                raise ConfigurationError(
+                    f'parameter {info.name} = {value} {info.unit}'.rstrip()
+                    + f': must lie between {info.low} and {info.high}'
+                )

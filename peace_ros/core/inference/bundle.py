@@ -6,20 +6,14 @@ from __future__ import annotations
 
 import hashlib
 import os
-import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from peace_ros.core.domain import BundleError
-from peace_ros.core.inference.manifest import FileEntry, InputSpec, Manifest, parse_manifest
+from peace_ros.core.inference.manifest import FileEntry, Manifest, parse_manifest
 from peace_ros.core.resources import models_dir
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-__all__ = ['MANIFEST_NAME', 'Bundle', 'FileEntry', 'InputSpec', 'Manifest']
 
 MANIFEST_NAME = 'manifest.json'
 _CHUNK_BYTES = 1 << 20
@@ -71,24 +65,6 @@ def user_models_dir() -> Path:
     return Path(os.environ.get('PEACE_MODELS_DIR', '~/.local/share/peace_ros/models')).expanduser()
 
 
-def put_in_place(stage: Path, folder: Path) -> None:
-    """Let a finished folder take the place of another beside it; raises OSError.
-
-    An older bundle is set aside first and comes back when the new one cannot be moved.
-    """
-    old = folder.with_name(f'.{folder.name}.old')
-    if folder.exists():
-        shutil.rmtree(old, ignore_errors=True)
-        folder.rename(old)
-    try:
-        stage.rename(folder)
-    except OSError:
-        if old.exists():
-            old.rename(folder)
-        raise
-    shutil.rmtree(old, ignore_errors=True)
-
-
 def _find(path_or_name: Path | str) -> Path:
     folder = Path(path_or_name).expanduser()
     if folder.is_dir():
@@ -104,11 +80,6 @@ def _find(path_or_name: Path | str) -> Path:
         f'no model bundle {name!r}: give a folder with a {MANIFEST_NAME} or the name of a '
         f'shipped bundle ({", ".join(names) or "none"} in {shipped})'
     )
-
-
-def file_entry(path: Path) -> dict[str, str | int]:
-    """Return what a manifest says of a file: its SHA-256 and its size."""
-    return {'sha256': sha256_of(path), 'bytes': path.stat().st_size}
 
 
 def sha256_of(path: Path) -> str:

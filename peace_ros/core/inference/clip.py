@@ -4,26 +4,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from peace_ros.core.domain import BundleError
+from peace_ros.core.domain import BundleError, Frame
+from peace_ros.core.inference.bundle import Bundle
 from peace_ros.core.inference.contract import IMAGE_EMBEDDING, PIXEL_VALUES
 from peace_ros.core.inference.preprocess import Preprocessor
-from peace_ros.core.inference.providers import LoadMeter
+from peace_ros.core.inference.providers import Footprint, LoadMeter
 from peace_ros.core.inference.session import DEFAULT_PROVIDERS, open_sessions
 from peace_ros.core.inference.text_encoder import TextEncoder
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from peace_ros.core.domain import Frame
-    from peace_ros.core.inference.bundle import Bundle
-    from peace_ros.core.inference.providers import Footprint
 
 
 class ClipEncoder:

@@ -4,16 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from peace_ros.core.domain import BundleError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from peace_ros.core.inference.manifest import Manifest
+from peace_ros.core.inference.manifest import Manifest
 
 PIXEL_VALUES = 'pixel_values'
 IMAGE_EMBEDDING = 'image_embedding'
@@ -58,15 +54,8 @@ def check_graphs(manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
     width = manifest.embedding_width
     if 'text_encoder' in graphs:
         text = graphs['text_encoder']
-        _match(
-            text,
-            'input',
-            text.inputs,
-            [
-                _tensor(INPUT_IDS, 'B', 'L', dtype=_INT64),
-                _tensor(ATTENTION_MASK, 'B', 'L', dtype=_INT64),
-            ],
-        )
+        tokens = [Tensor(name, _INT64, ('B', 'L')) for name in (INPUT_IDS, ATTENTION_MASK)]
+        _match(text, 'input', text.inputs, tokens)
         _match(text, 'output', text.outputs, [_tensor(TEXT_EMBEDDING, 'B', width)])
     if 'image_encoder' in graphs:
         image = graphs['image_encoder']
@@ -101,8 +90,8 @@ def _check_decoder(decoder: Graph, features: Sequence[Tensor], width: int) -> No
     _match(decoder, 'output', decoder.outputs, outputs)
 
 
-def _tensor(name: str, *shape: Size, dtype: str = _FLOAT) -> Tensor:
-    return Tensor(name, dtype, shape)
+def _tensor(name: str, *shape: Size) -> Tensor:
+    return Tensor(name, _FLOAT, shape)
 
 
 def _match(graph: Graph, side: str, have: Sequence[Tensor], wanted: Sequence[Tensor]) -> None:

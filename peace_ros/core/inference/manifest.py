@@ -6,15 +6,13 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from peace_ros.core.domain import BundleError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 FORMAT = 1
 ROLES_BY_FAMILY: Mapping[str, tuple[str, ...]] = MappingProxyType(
@@ -107,11 +105,8 @@ class _Reader:
         value = self._values.get(key, 'nothing')
         return BundleError(f'{self.where}: {key} is {value!r}; {remedy}')
 
-    def has(self, key: str) -> bool:
-        return key in self._values
-
-    def text(self, key: str, choices: tuple[str, ...] = ()) -> str:
-        value = self._values.get(key)
+    def text(self, key: str, choices: tuple[str, ...] = (), default: str | None = None) -> str:
+        value = self._values.get(key, default)
         if not isinstance(value, str) or not value.strip():
             raise self.refuse(key, 'give a non-empty string')
         if choices and value not in choices:
@@ -137,8 +132,8 @@ class _Reader:
             raise self.refuse(key, 'give a positive number')
         return float(value)
 
-    def table(self, key: str) -> dict[str, Any]:
-        value = self._values.get(key)
+    def table(self, key: str, default: dict[str, Any] | None = None) -> dict[str, Any]:
+        value = self._values.get(key, default)
         if not isinstance(value, dict):
             raise self.refuse(key, 'give a JSON object')
         return value
@@ -165,7 +160,7 @@ def parse_manifest(raw: bytes, where: str) -> Manifest:
         name=reader.text('name'),
         family=family,
         roles=_roles(reader, family, files),
-        input=_input(_Reader(f'{where}: input', reader.table('input')), family),
+        input=_input(reader, 'input', family),
         embedding_width=reader.whole('embedding_width', 1, 65536),
         context_length=reader.whole('context_length', 3, 4096),
         precision=reader.text('precision', PRECISIONS),
@@ -173,7 +168,7 @@ def parse_manifest(raw: bytes, where: str) -> Manifest:
         licence=reader.text('licence'),
         provenance=reader.text('provenance'),
         recommended=_numbers(reader, 'recommended'),
-        crop_input=_crop_input(reader, family),
+        crop_input=_input(reader, 'crop_input', family) if family == 'fastsam' else None,
         logit_scale=reader.positive('logit_scale', LOGIT_SCALE),
         verification=_numbers(reader, 'verification'),
     )
@@ -213,28 +208,21 @@ def _roles(reader: _Reader, family: str, files: Mapping[str, FileEntry]) -> Mapp
     return MappingProxyType(found)
 
 
-def _input(reader: _Reader, family: str) -> InputSpec:
+def _input(manifest: _Reader, key: str, family: str) -> InputSpec:
+    reader = _Reader(f'{manifest.where}: {key}', manifest.table(key))
     return InputSpec(
         width=reader.whole('width', 1, MAX_INPUT_PX),
         height=reader.whole('height', 1, MAX_INPUT_PX),
         resize=reader.text('resize', RESIZES_BY_FAMILY[family]),
         mean=reader.triple('mean', positive=False),
         std=reader.triple('std', positive=True),
-        interpolation=reader.text('interpolation', INTERPOLATIONS)
-        if reader.has('interpolation')
-        else 'area',
+        interpolation=reader.text('interpolation', INTERPOLATIONS, default='area'),
     )
-
-
-def _crop_input(reader: _Reader, family: str) -> InputSpec | None:
-    if family != 'fastsam':
-        return None
-    return _input(_Reader(f'{reader.where}: crop_input', reader.table('crop_input')), family)
 
 
 def _numbers(reader: _Reader, key: str) -> Mapping[str, float]:
     """Return an optional table of numbers."""
-    values = reader.table(key) if reader.has(key) else {}
+    values = reader.table(key, {})
     for name, value in values.items():
         if not _is_number(value):
             raise BundleError(f'{reader.where}: {key}: {name} is {value!r}; give a number')

@@ -5,23 +5,20 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
+from peace_ros.core.inference.contract import Graph, Tensor
+from peace_ros.core.inference.providers import OPENVINO
 
 _TYPES = {'f32': 'tensor(float)', 'i64': 'tensor(int64)'}
 _REAL = {'f16', 'f32', 'f64'}
 _MOST_COMPILED = 6
 """Sets of outputs and shapes that stay compiled."""
-
-Signature = tuple[str, str, tuple[int | None, ...]]
-"""Name, type and shape of a tensor; None is free."""
 
 
 class OpenVinoEngine:
@@ -43,6 +40,11 @@ class OpenVinoEngine:
         self._core = openvino.Core()
         self._model = self._core.read_model(str(path))
         self._refuse_damaged_weights()
+        inputs, outputs = (
+            tuple(map(_tensor, side)) for side in (self._model.inputs, self._model.outputs)
+        )
+        self.graph = Graph(path, inputs, outputs)
+        self.providers = (OPENVINO,)
         self._compiled: dict[Any, Any] = {}
         self._lock = threading.Lock()
         has_bf16 = 'BF16' in self._core.get_property('CPU', 'OPTIMIZATION_CAPABILITIES')
@@ -69,13 +71,6 @@ class OpenVinoEngine:
 
     def _is_int8(self) -> bool:
         return any(each.get_type_name() == 'FakeQuantize' for each in self._model.get_ops())
-
-    def signature(self) -> tuple[tuple[Signature, ...], tuple[Signature, ...]]:
-        """Return the inputs and the outputs."""
-        return (
-            tuple(_signature(each) for each in self._model.inputs),
-            tuple(_signature(each) for each in self._model.outputs),
-        )
 
     def run(self, outputs: Sequence[str], feeds: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:
         """Return the named outputs in their order; raises RuntimeError."""
@@ -108,9 +103,9 @@ class OpenVinoEngine:
         return self._openvino.Model(wanted, model.get_parameters(), 'part')
 
 
-def _signature(tensor: Any) -> Signature:
+def _tensor(tensor: Any) -> Tensor:
     sizes = tuple(
         None if size.is_dynamic else int(size.get_length()) for size in tensor.partial_shape
     )
     kind = tensor.element_type.get_type_name()
-    return tensor.any_name, _TYPES.get(kind, kind), sizes
+    return Tensor(tensor.any_name, _TYPES.get(kind, kind), sizes)

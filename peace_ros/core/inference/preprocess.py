@@ -4,18 +4,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 from peace_ros.core.domain import ImageError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from peace_ros.core.inference.manifest import InputSpec
+from peace_ros.core.inference.manifest import InputSpec
 
 MAX_PIXELS = 64_000_000
 """Larger images are refused: cameras do not take them, and they would stall everything else."""
@@ -25,18 +20,35 @@ _FILTERS = {
 }
 
 
+def normalisation(spec: InputSpec) -> tuple[NDArray[np.float32], ...]:
+    """Return per channel (RGB) what each of the 256 levels becomes: (level / 255 - mean) / std.
+
+    A table makes all three steps a single exact look-up.
+    """
+    levels = np.arange(256, dtype=np.float32) / np.float32(255.0)
+    return tuple(
+        ((levels - np.float32(mean)) / np.float32(std)).astype(np.float32)
+        for mean, std in zip(spec.mean, spec.std, strict=True)
+    )
+
+
+def refuse_too_large(image_rgb: NDArray[np.uint8]) -> None:
+    """Raise ImageError for a height x width x 3 image of more than MAX_PIXELS pixels."""
+    height, width = image_rgb.shape[:2]
+    if height * width > MAX_PIXELS:
+        raise ImageError(
+            f'image of {width} x {height} px: at most {MAX_PIXELS} px are taken; '
+            'let the camera driver scale it down'
+        )
+
+
 class Preprocessor:
     """Resizes an RGB image and normalises it as the bundle's manifest says."""
 
     def __init__(self, spec: InputSpec) -> None:
         self._spec = spec
         self._buffer = np.zeros((1, 3, spec.height, spec.width), np.float32)
-        levels = np.arange(256, dtype=np.float32) / np.float32(255.0)
-        # One table per channel makes /255, mean and std a single exact look-up.
-        self._tables = tuple(
-            ((levels - np.float32(mean)) / np.float32(std)).astype(np.float32)
-            for mean, std in zip(spec.mean, spec.std, strict=True)
-        )
+        self._tables = normalisation(spec)
 
     def __call__(self, image_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Return float32 [1, 3, H, W]; the array is overwritten by the next call.
@@ -47,12 +59,7 @@ class Preprocessor:
         Raises:
             ImageError: more than MAX_PIXELS pixels.
         """
-        height, width = image_rgb.shape[:2]
-        if height * width > MAX_PIXELS:
-            raise ImageError(
-                f'image of {width} x {height} px: at most {MAX_PIXELS} px are taken; '
-                'let the camera driver scale it down'
-            )
+        refuse_too_large(image_rgb)
         resized = self._resize(image_rgb)
         planes = cv2.split(np.ascontiguousarray(resized))
         for plane, table, target in zip(planes, self._tables, self._buffer[0], strict=True):

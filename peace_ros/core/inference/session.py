@@ -5,25 +5,21 @@
 from __future__ import annotations
 
 import mmap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
+import numpy as np
 import onnxruntime as ort
+from numpy.typing import NDArray
 from onnxruntime.capi import onnxruntime_pybind11_state as ort_state
 
 from peace_ros.core.domain import BundleError, ConfigurationError
+from peace_ros.core.inference.bundle import Bundle
 from peace_ros.core.inference.contract import Graph, Tensor, check_graphs
 from peace_ros.core.inference.openvino_engine import OpenVinoEngine
 from peace_ros.core.inference.providers import CPU, OPENVINO, check_providers, with_options
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from peace_ros.core.inference.bundle import Bundle
 
 DEFAULT_PROVIDERS = (CPU,)
 OPTIMISATIONS = MappingProxyType(
@@ -79,14 +75,15 @@ class Session:
             BundleError: ONNX Runtime cannot run the file.
         """
         check_providers(providers)
+        self._engine: OpenVinoEngine | _OnnxRuntimeEngine
         if providers[0] == OPENVINO:
-            opened = _openvino(path, threads)
+            self._engine = _openvino(path, threads)
         else:
             options = _options(threads, optimisation)
-            chosen = with_options(providers, checksum)
-            opened = _onnxruntime(path, options, chosen)
-        self._engine, self.graph, self.providers = opened
-        """``providers``: those in use; ONNX Runtime adds the CPU as the last."""
+            self._engine = _OnnxRuntimeEngine(path, options, with_options(providers, checksum))
+        self.graph: Graph = self._engine.graph
+        self.providers: tuple[str, ...] = self._engine.providers
+        """Those in use; ONNX Runtime adds the CPU as the last."""
         self.calls = 0
         """Runs since it was opened, without warm-ups."""
 
@@ -95,17 +92,12 @@ class Session:
     ) -> list[NDArray[np.float32]]:
         """Run once and return the named outputs in their order. Raises BundleError."""
         self.calls += 1
-        return self._run(outputs, feeds)
+        return self.warm_up(outputs, feeds)
 
     def warm_up(
         self, outputs: Sequence[str], feeds: Mapping[str, NDArray[Any]]
     ) -> list[NDArray[np.float32]]:
         """Run once without counting, so that the first frame waits for no allocation."""
-        return self._run(outputs, feeds)
-
-    def _run(
-        self, outputs: Sequence[str], feeds: Mapping[str, NDArray[Any]]
-    ) -> list[NDArray[np.float32]]:
         try:
             arrays = self._engine.run(list(outputs), feeds)
         except _ORT_ERRORS as error:
@@ -144,8 +136,31 @@ def open_sessions(
 class _OnnxRuntimeEngine:
     """ONNX Runtime, running only what the asked-for outputs need."""
 
-    def __init__(self, session: Any) -> None:
-        self._session = session
+    def __init__(self, path: Path, options: ort.SessionOptions, providers: Sequence[Any]) -> None:
+        try:
+            self._session = ort.InferenceSession(
+                str(path),
+                options,
+                providers=list(providers),
+                disabled_optimizers=_HINDER_INT8 if _is_quantised(path) else None,
+            )
+        except _ORT_ERRORS as error:
+            raise BundleError(
+                f'{path}: ONNX Runtime {ort.__version__} cannot open it ({error}); '
+                'export the model again'
+            ) from error
+        self.providers = tuple(self._session.get_providers())
+        names = [each if isinstance(each, str) else each[0] for each in providers]
+        if not set(names) & set(self.providers):
+            raise ConfigurationError(
+                f'execution provider {", ".join(names)} did not start for {path}, only '
+                f'{", ".join(self.providers)}; check its driver or add CPUExecutionProvider'
+            )
+        inputs, outputs = (
+            tuple(Tensor(each.name, each.type, tuple(each.shape or ())) for each in side)
+            for side in (self._session.get_inputs(), self._session.get_outputs())
+        )
+        self.graph = Graph(path, inputs, outputs)
         self._options = ort.RunOptions()
         self._options.only_execute_path_to_fetches = True
 
@@ -154,7 +169,13 @@ class _OnnxRuntimeEngine:
         return cast('list[NDArray[Any]]', arrays)
 
 
-_Opened = tuple[_OnnxRuntimeEngine | OpenVinoEngine, Graph, tuple[str, ...]]
+def _openvino(path: Path, threads: int) -> OpenVinoEngine:
+    try:
+        return OpenVinoEngine(path, threads)
+    except RuntimeError as error:
+        raise BundleError(
+            f'{path}: OpenVINO cannot open it ({error}); export the model again'
+        ) from error
 
 
 def _options(threads: int, optimisation: str) -> ort.SessionOptions:
@@ -173,52 +194,3 @@ def _is_quantised(path: Path) -> bool:
             return held.find(b'DequantizeLinear') >= 0
     except (OSError, ValueError):
         return False  # ONNX Runtime says what is wrong with the file
-
-
-def _onnxruntime(path: Path, options: ort.SessionOptions, providers: Sequence[Any]) -> _Opened:
-    try:
-        session = ort.InferenceSession(
-            str(path),
-            options,
-            providers=list(providers),
-            disabled_optimizers=_HINDER_INT8 if _is_quantised(path) else None,
-        )
-    except _ORT_ERRORS as error:
-        raise BundleError(
-            f'{path}: ONNX Runtime {ort.__version__} cannot open it ({error}); '
-            'export the model again'
-        ) from error
-    in_use = tuple(session.get_providers())
-    names = [each if isinstance(each, str) else each[0] for each in providers]
-    if not set(names) & set(in_use):
-        raise ConfigurationError(
-            f'execution provider {", ".join(names)} did not start for {path}, only '
-            f'{", ".join(in_use)}; check its driver or add CPUExecutionProvider'
-        )
-    graph = Graph(
-        path,
-        tuple(_tensor(each) for each in session.get_inputs()),
-        tuple(_tensor(each) for each in session.get_outputs()),
-    )
-    return _OnnxRuntimeEngine(session), graph, in_use
-
-
-def _openvino(path: Path, threads: int) -> _Opened:
-    try:
-        engine = OpenVinoEngine(path, threads)
-    except RuntimeError as error:
-        raise BundleError(
-            f'{path}: OpenVINO cannot open it ({error}); export the model again'
-        ) from error
-    inputs, outputs = engine.signature()
-    graph = Graph(
-        path,
-        tuple(Tensor(*each) for each in inputs),
-        tuple(Tensor(*each) for each in outputs),
-    )
-    return engine, graph, (OPENVINO,)
-
-
-def _tensor(node: Any) -> Tensor:
-    sizes = node.shape or ()
-    return Tensor(node.name, node.type, tuple(sizes))

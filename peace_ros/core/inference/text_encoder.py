@@ -5,23 +5,18 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from peace_ros.core.domain import BundleError
+from peace_ros.core.inference.bundle import Bundle
 from peace_ros.core.inference.contract import ATTENTION_MASK, INPUT_IDS, TEXT_EMBEDDING
+from peace_ros.core.inference.session import Session
 from peace_ros.core.inference.text_cache import TextCache
 from peace_ros.core.inference.tokenizer import Tokenizer
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from peace_ros.core.inference.bundle import Bundle
-    from peace_ros.core.inference.session import Session
 
 
 class TextEncoder:

@@ -7,20 +7,17 @@ from __future__ import annotations
 import html
 import logging
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import ftfy
 import numpy as np
 import tokenizers
+from numpy.typing import NDArray
 
 from peace_ros.core.domain import BundleError, ConfigurationError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
 
 END_OF_WORD = '</w>'
 """How CLIP's byte-pair encoding marks the end of a word; no other tokenizer here does."""
@@ -55,8 +52,9 @@ class Tokenizer:
             pad_id=padding.get('pad_id', 0), pad_token=padding.get('pad_token', '[PAD]')
         )
         self._tokenizer.enable_truncation(context_length)
-        self._unknown_id = _unknown_id(self._tokenizer)
         model = self._tokenizer.model
+        unknown = getattr(model, 'unk_token', None)
+        self._unknown_id = None if unknown is None else self._tokenizer.token_to_id(unknown)
         self._cleans = getattr(model, 'end_of_word_suffix', None) == END_OF_WORD
         self._reported: set[str] = set()
 
@@ -67,7 +65,8 @@ class Tokenizer:
         """
         if not texts or not all(text.strip() for text in texts):
             raise ConfigurationError(f'texts to encode {list(texts)}: give non-blank texts')
-        encodings = self._tokenizer.encode_batch([self._cleaned(text) for text in texts])
+        cleaned = map(clean_for_clip, texts) if self._cleans else texts
+        encodings = self._tokenizer.encode_batch(list(cleaned))
         for text, encoding in zip(texts, encodings, strict=True):
             if encoding.overflowing and text not in self._reported:
                 self._reported.add(text)
@@ -81,9 +80,6 @@ class Tokenizer:
             np.array([each.ids for each in encodings], np.int64),
             np.array([each.attention_mask for each in encodings], np.int64),
         )
-
-    def _cleaned(self, text: str) -> str:
-        return clean_for_clip(text) if self._cleans else text
 
     def unknown_words(self, text: str) -> tuple[str, ...]:
         """Return the words of a text that the model has never learned, as they are written.
@@ -106,8 +102,3 @@ def clean_for_clip(text: str) -> str:
     """
     fixed = html.unescape(html.unescape(ftfy.fix_text(text)))
     return re.sub(r'\s+', ' ', fixed).strip().lower()
-
-
-def _unknown_id(tokenizer: tokenizers.Tokenizer) -> int | None:
-    token = getattr(tokenizer.model, 'unk_token', None)
-    return None if token is None else tokenizer.token_to_id(token)

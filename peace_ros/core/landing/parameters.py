@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from peace_ros.core.domain import ConfigurationError
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 
 SAFETY_THRESHOLD_FLOOR = 0.65
 """No configuration lets ground of a lower safety score count as safe."""
@@ -16,7 +16,7 @@ CELL_SCORE_FLOOR = 0.5
 
 
 @dataclass(frozen=True)
-class LandingParameters:
+class LandingParameters(ParameterSet):
     """Defaults are those of the released DOVESEI unless the description says otherwise."""
 
     # Altitudes
@@ -251,7 +251,7 @@ class LandingParameters:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         self._in_order('handover_altitude_m', 'safe_altitude_m')
         self._in_order('relaxed_threshold', 'safety_threshold')
         self._in_order('preferred_clearance_m', 'ample_clearance_m')

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from peace_ros.core.domain import Camera, DepthImage, Pose
 from peace_ros.core.domain.geometry import rotation_matrix
-from peace_ros.core.mapping.layers import shifted
 from peace_ros.core.mapping.parameters import MapParameters
 from peace_ros.core.mapping.projection import GroundGrid
 
@@ -104,33 +103,3 @@ def _spread_m(
     average = mean(height) / safe_share
     variance = mean(height * height) / safe_share - average * average
     return np.sqrt(np.maximum(variance, 0.0)), enough
-
-
-class Roughness:
-    """Cells that were rough when they were measured last."""
-
-    def __init__(self, cells: int) -> None:
-        self._cells = cells
-        self.clear()
-
-    def clear(self) -> None:
-        """Forget everything."""
-        self._rough = np.zeros((self._cells, self._cells), np.bool_)
-
-    def shift(self, d_row: int, d_column: int) -> None:
-        """Follow the window of the map by whole cells."""
-        self._rough = shifted(self._rough, d_row, d_column, 0.0)
-
-    def widen(self, kernel: NDArray[np.uint8]) -> None:
-        """Let rough cells grow."""
-        self._rough = cv2.dilate(self._rough.astype(np.uint8), kernel) > 0
-
-    def take(self, rough: NDArray[np.bool_], flat: NDArray[np.bool_]) -> None:
-        """Take one look; what it did not measure stays."""
-        self._rough |= rough
-        self._rough &= ~flat
-
-    def closed(self, rows: slice, columns: slice) -> NDArray[np.bool_]:
-        """Return which cells are rough."""
-        rough: NDArray[np.bool_] = self._rough[rows, columns]
-        return rough

@@ -7,11 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from peace_ros.core.domain import ConfigurationError
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 
 
 @dataclass(frozen=True)
-class MapParameters:
+class MapParameters(ParameterSet):
     """Size, evidence and memory of a :class:`~peace_ros.core.mapping.SafetyMap`."""
 
     map_cell_m: float = parameter(0.5, 'Edge of a map cell.', low=0.1, high=5.0)
@@ -124,7 +124,7 @@ class MapParameters:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.clear_score < self.neutral_score:
             raise ConfigurationError(
                 f'parameter clear_score = {self.clear_score} must not be below neutral_score = '

@@ -116,25 +116,14 @@ def register(before: View, after: View, camera: Camera) -> Displacement | Mismat
         return Mismatch.HORIZON
     shared = 0.5 * (first_middle + second_middle)
     # Around the same point seen from the vehicle only its motion is left to be found.
-    for at in ((shared, shared), (first_middle, second_middle)):
+    for first_at, second_at in ((shared, shared), (first_middle, second_middle)):
         for part in _PATCH_PARTS:
             edge_m = part * width_m
-            first = _patch(before, camera, at[0], edge_m)
-            second = _patch(after, camera, at[1], edge_m)
+            first = _patch(before, camera, first_at, edge_m)
+            second = _patch(after, camera, second_at, edge_m)
             if first is not None and second is not None:
-                return _compare(first, second, edge_m, lower_m)
+                return _compare(first, second, first_at - second_at, edge_m, lower_m)
     return Mismatch.HORIZON
-
-
-@dataclass(frozen=True)
-class _Patch:
-    """A square of level ground, north up."""
-
-    ground: NDArray[np.float32]
-    """PATCH_PX x PATCH_PX grey levels."""
-    north_m: float
-    """Of its middle, from the point below the camera."""
-    east_m: float
 
 
 def _seen_by(view: View, camera: Camera) -> tuple[Camera, Pose]:
@@ -154,8 +143,14 @@ def _middle(view: View, camera: Camera) -> NDArray[np.float64] | None:
     return ground
 
 
-def _patch(view: View, camera: Camera, middle: NDArray[np.float64], edge_m: float) -> _Patch | None:
-    """Cut a square of ground out of the picture; None when it is not all in view."""
+def _patch(
+    view: View, camera: Camera, middle: NDArray[np.float64], edge_m: float
+) -> NDArray[np.float32] | None:
+    """Cut a square of level ground, north up, out of the picture; None when not all is in view.
+
+    :param middle: (north, east) metres of its middle, from the point below the camera.
+    :return: PATCH_PX x PATCH_PX grey levels.
+    """
     small, pose = _seen_by(view, camera)
     north_m, east_m = float(middle[0]), float(middle[1])
     cell_m, half = edge_m / PATCH_PX, 0.5 * (PATCH_PX - 1)
@@ -185,28 +180,33 @@ def _patch(view: View, camera: Camera, middle: NDArray[np.float64], edge_m: floa
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
     )
     smooth = cv2.GaussianBlur(ground.astype(np.float32), (0, 0), 1.0)
-    return _Patch(cast('NDArray[np.float32]', smooth), north_m, east_m)
+    return cast('NDArray[np.float32]', smooth)
 
 
 def _compare(
-    first: _Patch, second: _Patch, edge_m: float, altitude_m: float
+    first: NDArray[np.float32],
+    second: NDArray[np.float32],
+    apart: NDArray[np.float64],
+    edge_m: float,
+    altitude_m: float,
 ) -> Displacement | Mismatch:
-    if min(first.ground.std(), second.ground.std()) < _LEAST_TEXTURE:
+    """Compare two patches; apart: by how many metres (north, east) the first lies ahead."""
+    if min(first.std(), second.std()) < _LEAST_TEXTURE:
         return Mismatch.TEXTURE
-    if min(_cross_texture(first.ground), _cross_texture(second.ground)) < _LEAST_CROSS_TEXTURE:
+    if min(_cross_texture(first), _cross_texture(second)) < _LEAST_CROSS_TEXTURE:
         return Mismatch.AMBIGUOUS
-    down_px, right_px, ratio = _shift(first.ground, second.ground)
+    down_px, right_px, ratio = _shift(first, second)
     if hypot(down_px, right_px) > _LARGEST_SHIFT * PATCH_PX:
         return Mismatch.FAR
     if ratio < _LEAST_PEAK_RATIO:
         return Mismatch.AMBIGUOUS
-    agreement = _agreement(first.ground, second.ground, round(down_px), round(right_px))
+    agreement = _agreement(first, second, round(down_px), round(right_px))
     if agreement < _LEAST_CORRELATION:
         return Mismatch.DIFFERENT
     # The same ground lies in both: camera + middle of its patch + place in the patch.
     cell_m = edge_m / PATCH_PX
-    north_m = first.north_m - second.north_m - down_px * cell_m
-    east_m = first.east_m - second.east_m + right_px * cell_m
+    north_m = float(apart[0]) - down_px * cell_m
+    east_m = float(apart[1]) + right_px * cell_m
     error_m = (
         _ERROR_PX * cell_m
         + _ERROR_PER_ALTITUDE * altitude_m

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from peace_ros.core.domain import Camera, DepthImage, Heatmap, ImageError, Pose
 from peace_ros.core.domain.errors import VehicleError
-from peace_ros.core.mapping.flatness import Roughness, rough_and_flat
+from peace_ros.core.mapping.flatness import rough_and_flat
 from peace_ros.core.mapping.layers import MapLayers, shifted
 from peace_ros.core.mapping.parameters import MapParameters
 from peace_ros.core.mapping.projection import (
@@ -79,7 +79,6 @@ class SafetyMap:
         self.parameters = parameters or MapParameters()
         self._cells = max(1, round(self.parameters.map_size_m / self.parameters.map_cell_m))
         self._veto = Veto(self.parameters, self._cells)
-        self._roughness = Roughness(self._cells)
         self.revision = -1
         """Grows with every change."""
         self.clear()
@@ -87,8 +86,9 @@ class SafetyMap:
     def clear(self) -> None:
         """Forget everything."""
         self._veto.clear()
-        self._roughness.clear()
         shape = (self._cells, self._cells)
+        self._rough = np.zeros(shape, np.bool_)
+        """As it was measured last."""
         self._log_odds = np.zeros(shape, np.float32)
         self._seen_s = np.full(shape, _NEVER_S, np.float32)
         self._pixel_m = np.full(shape, np.inf, np.float32)
@@ -140,7 +140,9 @@ class SafetyMap:
         """
         self._check_pose(pose)
         self._follow(pose)
-        self._roughness.take(*rough_and_flat(depth, camera, pose, self._grid, self.parameters))
+        rough, flat = rough_and_flat(depth, camera, pose, self._grid, self.parameters)
+        self._rough |= rough
+        self._rough &= ~flat
 
     def _check(self, heatmap: Heatmap, pose: Pose) -> None:
         low, high = float(heatmap.safety.min()), float(heatmap.safety.max())
@@ -179,7 +181,7 @@ class SafetyMap:
         if abs(d_row) <= slack and abs(d_column) <= slack:
             return
         self._first_row, self._first_column = row, column
-        self._roughness.shift(d_row, d_column)
+        self._rough = shifted(self._rough, d_row, d_column, 0.0)
         if self._epoch_ns is None:
             return
         self._log_odds = shifted(self._log_odds, d_row, d_column, 0.0)
@@ -202,7 +204,7 @@ class SafetyMap:
         self._seen_s = cast('NDArray[np.float32]', cv2.erode(self._seen_s, kernel))
         self._looks = cast('NDArray[np.uint16]', cv2.erode(self._looks, kernel))
         self._veto.widen(kernel)
-        self._roughness.widen(kernel)
+        self._rough = cv2.dilate(self._rough.astype(np.uint8), kernel) > 0
         self.revision += 1
 
     def _decay(self, elapsed_s: float) -> tuple[float, float]:
@@ -318,7 +320,7 @@ class SafetyMap:
         known = looks > 0
         score = np.where(known, 1.0 / (1.0 + np.exp(-aged)), 0.0).astype(np.float32)
         score[self._veto.closed(rows, columns, self._seconds(now_ns))] = 0.0
-        score[self._roughness.closed(rows, columns)] = 0.0
+        score[self._rough[rows, columns]] = 0.0
         age = self._seconds(now_ns) - self._seen_s[rows, columns]
         age = np.where(known, age, np.inf).astype(np.float32)
         south_m = grid.south_m + rows.start * grid.cell_m

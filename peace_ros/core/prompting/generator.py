@@ -4,21 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from peace_ros.core.domain import ConfigurationError, Frame, Prompt, RankedWord
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 from peace_ros.core.prompting.templates import categories_of, resolve_template
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from peace_ros.core.prompting.vocabulary import Vocabularies
+from peace_ros.core.prompting.vocabulary import Vocabularies
 
 
 class Encoder(Protocol):
@@ -34,7 +30,7 @@ class Encoder(Protocol):
 
 
 @dataclass(frozen=True)
-class PromptingParameters:
+class PromptingParameters(ParameterSet):
     """Parameters of the prompt generator."""
 
     template: str = parameter(
@@ -80,7 +76,7 @@ class PromptingParameters:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         resolve_template(self.template)
 
     @property

@@ -11,16 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import ConfigurationError, Frame, Heatmap, Prompt
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 from peace_ros.core.inference import Preprocessor
 from peace_ros.core.inference.contract import IS_POSITIVE, PIXEL_VALUES, TERM_LOGITS, TEXT_EMBEDDING
 from peace_ros.core.segmentation.fusion import calibrated
 from peace_ros.core.segmentation.looks import joined, parts_of
-from peace_ros.core.segmentation.segmenter import (
-    BundleOrName,
-    BundleSegmenter,
-    SegmentationParameters,
-)
+from peace_ros.core.segmentation.segmenter import BundleSegmenter, SegmentationParameters
 from peace_ros.core.segmentation.terms import Terms
 
 Image = NDArray[np.uint8]
@@ -31,7 +27,7 @@ _ROUNDING = 1e-3
 
 
 @dataclass(frozen=True)
-class ClipSegParameters:
+class ClipSegParameters(ParameterSet):
     """Parameters of the family clipseg."""
 
     clipseg_max_looks: int = parameter(
@@ -42,9 +38,6 @@ class ClipSegParameters:
         high=101,
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 class ClipSegSegmenter(BundleSegmenter):
     """A Segmenter over a bundle of the family ``clipseg``."""
@@ -53,42 +46,19 @@ class ClipSegSegmenter(BundleSegmenter):
     ROLES = ('image_encoder', 'text_encoder', 'decoder')
     MEASURED_WITH = 'set_difference'
 
-    def __init__(
-        self,
-        bundle: BundleOrName,
-        terms: Terms,
-        parameters: SegmentationParameters,
-        own: ClipSegParameters | None = None,
-    ) -> None:
-        """Open the bundle's graphs and run them once.
-
-        Args:
-            bundle: of the family ``clipseg``.
-            terms: what to look for.
-            parameters: of the segmentation; its bundle and terms are those given here.
-            own: of the family; None: as they are declared.
-
-        Raises:
-            BundleError: the bundle is of another family or its graphs do not fit it.
-            ConfigurationError: an execution provider is not available, or softmax is asked for
-                without a negative term.
-        """
+    def _check_terms(self, terms: Terms, parameters: SegmentationParameters) -> None:
         if parameters.fusion == 'softmax' and not terms.negative:
             raise ConfigurationError(
                 'fusion softmax without negative terms would call everything safe: '
                 'name negative terms or choose set_difference'
             )
-        super().__init__(bundle, terms, parameters)
+
+    def _warm_up(self, own: ClipSegParameters | None) -> None:
         self._max_looks = (own or ClipSegParameters()).clipseg_max_looks
         self._preprocess = Preprocessor(self._manifest.input)
         self._features = [each.name for each in self._sessions['image_encoder'].graph.outputs]
-        self._is_positive = np.array(
-            [1.0] * len(terms.positive) + [0.0] * len(terms.negative), np.float32
-        )
-        self._warm_up()
-        self._loaded()
-
-    def _warm_up(self) -> None:
+        positive, negative = len(self.terms.positive), len(self.terms.negative)
+        self._is_positive = np.array([1.0] * positive + [0.0] * negative, np.float32)
         size = self._manifest.input
         blank = np.zeros((size.height, size.width, 3), np.uint8)
         encoder = self._sessions['image_encoder']
@@ -107,7 +77,7 @@ class ClipSegSegmenter(BundleSegmenter):
         """
         texts = self._embeddings(prompt)
         (safety,) = self._closely(frame, lambda image: self._safety(image, texts))
-        return Heatmap(calibrated(safety, self._threshold), frame.stamp_ns)
+        return Heatmap(calibrated(safety, self.threshold), frame.stamp_ns)
 
     def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
         """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``."""

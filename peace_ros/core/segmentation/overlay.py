@@ -4,15 +4,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from peace_ros.core.domain import Frame, Heatmap
+from peace_ros.core.domain import Frame, Heatmap
 
 _SAFE_RGB = np.array([40, 220, 60], np.float32)
 _UNSAFE_RGB = np.array([230, 40, 40], np.float32)

@@ -90,7 +90,7 @@ def create_segmenter(
         parameters,
         family.parameters() if own is None else own,
     )
-    log.info(f'model: {segmenter.footprint}')
+    log.info(f'model: {segmenter.footprint or type(segmenter).__name__}')
     for term, words in segmenter.unknown_terms.items():
         log.warning(
             f'term {term!r}: the model has never learned {", ".join(words)} and cannot see it'

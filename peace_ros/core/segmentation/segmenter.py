@@ -4,16 +4,17 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 from peace_ros.core.inference import Bundle, TextEncoder, open_sessions
 from peace_ros.core.inference.providers import Footprint, LoadMeter
 from peace_ros.core.segmentation.fusion import FUSIONS
@@ -24,7 +25,7 @@ BundleOrName = Bundle | Path | str
 
 
 @dataclass(frozen=True)
-class SegmentationParameters:
+class SegmentationParameters(ParameterSet):
     """Parameters of the segmentation, whatever the family of its model."""
 
     family: str = parameter('clipseg', 'Family of the segmentation model: clipseg or fastsam')
@@ -48,9 +49,6 @@ class SegmentationParameters:
         '', 'Folder that keeps text embeddings for the next start; empty keeps them in memory only'
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 class Segmenter(Protocol):
     """Frame + Prompt -> Heatmap; a subclass needs :attr:`terms` and :meth:`segment`.
@@ -61,6 +59,10 @@ class Segmenter(Protocol):
 
     terms: Terms
     """What it looks for."""
+    footprint: Footprint | None = None
+    """What its networks run on and take; None where that was not measured."""
+    threshold: float = 0.5
+    """The network's own score that stands at one half of the heatmap, between 0 and 1."""
 
     @property
     def unknown_terms(self) -> Mapping[str, tuple[str, ...]]:
@@ -71,16 +73,6 @@ class Segmenter(Protocol):
     def calls(self) -> Mapping[str, int]:
         """Role of a network -> how often it ran, without warm-ups."""
         return {}
-
-    @property
-    def footprint(self) -> Footprint | str:
-        """What its networks run on and take, to be printed."""
-        return type(self).__name__
-
-    @property
-    def threshold(self) -> float:
-        """The network's own score that stands at one half of the heatmap, between 0 and 1."""
-        return 0.5
 
     def prepare(self, prompt: Prompt) -> None:
         """Embed the prompt's texts ahead of the frame; may be called from another thread."""
@@ -110,48 +102,55 @@ class BundleSegmenter(Segmenter):
     """The fusion for which the threshold that a bundle recommends was measured."""
 
     def __init__(
-        self, bundle: BundleOrName, terms: Terms, parameters: SegmentationParameters
+        self,
+        bundle: BundleOrName,
+        terms: Terms,
+        parameters: SegmentationParameters,
+        own: Any = None,
     ) -> None:
-        """Open the bundle's graphs; :meth:`_loaded` is due after their first run.
+        """Open the bundle's graphs and run them once.
+
+        Args:
+            bundle: of the family.
+            terms: what to look for.
+            parameters: of the segmentation; its bundle and terms are those given here.
+            own: of the family; None: as they are declared.
 
         Raises:
             BundleError: the bundle is of another family or its graphs do not fit it.
-            ConfigurationError: an execution provider is not available.
+            ConfigurationError: an execution provider is not available, or the terms do not fit
+                the family or the fusion.
         """
+        self._check_terms(terms, parameters)
         loaded = bundle if isinstance(bundle, Bundle) else Bundle.load(bundle)
         loaded.require_family(self.FAMILY)
-        self._meter = LoadMeter()
+        meter = LoadMeter()
         self._manifest = loaded.manifest
         self.terms = terms
-        self._parameters = parameters
         self._fusion = FUSIONS[parameters.fusion]
-        self._threshold = self._recommended(loaded)
+        if parameters.fusion == self.MEASURED_WITH:
+            self.threshold = _recommended_threshold(loaded)
         self._sessions = open_sessions(
             loaded, self.ROLES, threads=parameters.threads, providers=parameters.providers
         )
         cache_dir = Path(parameters.cache_dir).expanduser() if parameters.cache_dir else None
         self._text = TextEncoder(loaded, self._sessions['text_encoder'], cache_dir)
-
-    def _recommended(self, bundle: Bundle) -> float:
-        if self._parameters.fusion != self.MEASURED_WITH:
-            return 0.5
-        threshold = float(bundle.manifest.recommended.get('threshold', 0.5))
-        if not 0.0 < threshold < 1.0:
-            raise BundleError(
-                f'{bundle.folder / "manifest.json"}: recommended threshold {threshold} must lie '
-                'between 0 and 1, both excluded: correct the manifest or export the bundle again'
-            )
-        return threshold
-
-    def _loaded(self) -> None:
-        """Take stock of what the networks hold by now."""
-        providers = dict.fromkeys(
-            each for session in self._sessions.values() for each in session.providers
+        self._warm_up(own)
+        providers = [each for session in self._sessions.values() for each in session.providers]
+        self.footprint = meter.read(
+            loaded.manifest.name,
+            loaded.manifest.precision,
+            tuple(dict.fromkeys(providers)),
+            parameters.threads,
         )
-        manifest = self._manifest
-        self._footprint = self._meter.read(
-            manifest.name, manifest.precision, tuple(providers), self._parameters.threads
-        )
+
+    @abstractmethod
+    def _check_terms(self, terms: Terms, parameters: SegmentationParameters) -> None:
+        """Raise ConfigurationError when the scores of these terms would mean nothing."""
+
+    @abstractmethod
+    def _warm_up(self, own: Any) -> None:
+        """Run each network once, so that no frame waits for memory; own: as it was given."""
 
     @property
     def unknown_terms(self) -> Mapping[str, tuple[str, ...]]:
@@ -162,16 +161,6 @@ class BundleSegmenter(Segmenter):
     def calls(self) -> Mapping[str, int]:
         """Role of a network -> how often it ran, without warm-ups."""
         return {role: session.calls for role, session in self._sessions.items()}
-
-    @property
-    def footprint(self) -> Footprint:
-        """What its networks run on and take."""
-        return self._footprint
-
-    @property
-    def threshold(self) -> float:
-        """What the bundle recommends, where the fusion is the one that it was measured with."""
-        return self._threshold
 
     def prepare(self, prompt: Prompt) -> None:
         """Embed the prompt's texts ahead of the frame; may be called from another thread."""
@@ -186,3 +175,13 @@ class BundleSegmenter(Segmenter):
             f'{path}: gave {what}, which cannot be used; the frame gets no heatmap, choose '
             'another bundle if this stays'
         )
+
+
+def _recommended_threshold(bundle: Bundle) -> float:
+    threshold = float(bundle.manifest.recommended.get('threshold', 0.5))
+    if not 0.0 < threshold < 1.0:
+        raise BundleError(
+            f'{bundle.folder / "manifest.json"}: recommended threshold {threshold} must lie '
+            'between 0 and 1, both excluded: correct the manifest or export the bundle again'
+        )
+    return threshold

@@ -7,11 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from peace_ros.core.domain.errors import ConfigurationError
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 
 
 @dataclass(frozen=True)
-class VehicleParameters:
+class VehicleParameters(ParameterSet):
     """How to reach the autopilot and what to ask of it."""
 
     system_id: int = parameter(
@@ -83,12 +83,9 @@ class VehicleParameters:
         3.0, 'Longest wait for the answer to a request.', unit='s', low=0.5, high=30.0
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True)
-class SenderParameters:
+class SenderParameters(ParameterSet):
     """The timed sender and its dead-man."""
 
     rate_hz: float = parameter(20.0, 'Rate of velocity set-points.', unit='Hz', low=4.0, high=50.0)
@@ -108,7 +105,7 @@ class SenderParameters:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.limit_s < 2.0 / self.rate_hz:
             raise ConfigurationError(
                 f'parameter limit_s = {self.limit_s} s with rate_hz = {self.rate_hz} Hz: give at '

@@ -40,8 +40,9 @@ from peace_ros.core.segmentation import (
     Terms,
     set_difference,
 )
-from peace_ros.core.segmentation.fastsam import Letterbox, assemble, detect
 from peace_ros.core.segmentation.fastsam.crops import Cutter
+from peace_ros.core.segmentation.fastsam.letterbox import Letterbox
+from peace_ros.core.segmentation.fastsam.masks import assemble, detect
 from peace_ros.core.segmentation.fastsam.selection import select
 from peace_ros.lab.benchmark.measure import Measured, Spread, Stopwatch
 from peace_ros.lab.benchmark.scene import IS_POSITIVE_13, TERMS_13, TERMS_39, draw_frames

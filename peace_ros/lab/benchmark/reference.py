@@ -30,7 +30,8 @@ from peace_ros.core.inference.tokenizer import Tokenizer
 from peace_ros.core.prompting import load_vocabularies
 from peace_ros.core.prompting.vocabulary import CATEGORIES
 from peace_ros.core.segmentation import FastSamParameters
-from peace_ros.core.segmentation.fastsam import Letterbox, Segment, assemble, detect
+from peace_ros.core.segmentation.fastsam.letterbox import Letterbox
+from peace_ros.core.segmentation.fastsam.masks import Segment, assemble, detect
 from peace_ros.core.segmentation.fastsam.selection import select
 from peace_ros.lab.benchmark.bundles import SEGMENTS
 from peace_ros.lab.benchmark.measure import Measured, Stopwatch

@@ -16,8 +16,9 @@ from urllib.parse import urljoin, urlsplit
 from urllib.request import url2pathname
 
 from peace_ros.core.domain import BundleError
-from peace_ros.core.inference.bundle import MANIFEST_NAME, Bundle, put_in_place
+from peace_ros.core.inference.bundle import MANIFEST_NAME, Bundle
 from peace_ros.core.inference.manifest import parse_manifest
+from peace_ros.lab.export.staging import put_in_place
 
 Progress = Callable[[str, int, int], None]
 """Takes file, bytes so far and bytes in all."""

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from peace_ros.core.domain import BundleError
-from peace_ros.core.inference.bundle import MANIFEST_NAME, file_entry, put_in_place
+from peace_ros.core.inference.bundle import MANIFEST_NAME, sha256_of
 from peace_ros.core.inference.manifest import FORMAT, ROLES_BY_FAMILY, InputSpec
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -78,3 +78,26 @@ def change_manifest(folder: Path, **values: Any) -> None:
 
 def _write(folder: Path, manifest: Mapping[str, Any]) -> None:
     (folder / MANIFEST_NAME).write_text(json.dumps(manifest, indent=2) + '\n', encoding='utf-8')
+
+
+def file_entry(path: Path) -> dict[str, str | int]:
+    """Return what a manifest says of a file: its SHA-256 and its size."""
+    return {'sha256': sha256_of(path), 'bytes': path.stat().st_size}
+
+
+def put_in_place(stage: Path, folder: Path) -> None:
+    """Let a finished folder take the place of another beside it; raises OSError.
+
+    An older bundle is set aside first and comes back when the new one cannot be moved.
+    """
+    old = folder.with_name(f'.{folder.name}.old')
+    if folder.exists():
+        shutil.rmtree(old, ignore_errors=True)
+        folder.rename(old)
+    try:
+        stage.rename(folder)
+    except OSError:
+        if old.exists():
+            old.rename(folder)
+        raise
+    shutil.rmtree(old, ignore_errors=True)

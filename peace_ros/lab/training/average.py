@@ -19,8 +19,8 @@ from onnx import numpy_helper
 
 from peace_ros.core.domain import BundleError, ConfigurationError
 from peace_ros.core.inference import Bundle
-from peace_ros.core.inference.bundle import MANIFEST_NAME, file_entry
-from peace_ros.lab.export.staging import change_manifest, staged
+from peace_ros.core.inference.bundle import MANIFEST_NAME
+from peace_ros.lab.export.staging import change_manifest, file_entry, staged
 
 _FLOATS = (np.float16, np.float32)
 

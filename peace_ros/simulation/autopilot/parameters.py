@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 
 
 @dataclass(frozen=True)
-class AutopilotParameters:
+class AutopilotParameters(ParameterSet):
     """What a user may choose of the simulated vehicle and its server."""
 
     autopilot: str = parameter(
@@ -86,6 +86,3 @@ class AutopilotParameters:
     rangefinder_max_m: float = parameter(
         40.0, 'Range of the downward rangefinder.', unit='m', low=1.0, high=500.0
     )
-
-    def __post_init__(self) -> None:
-        check(self)

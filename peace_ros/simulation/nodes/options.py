@@ -7,14 +7,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from peace_ros.core.domain import ConfigurationError
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 from peace_ros.core.node_parameters import CameraOptions, Group
 from peace_ros.core.vehicle import AUTO, check_access
 from peace_ros.simulation.autopilot import AutopilotParameters
 
 
 @dataclass(frozen=True)
-class SatelliteViewOptions:
+class SatelliteViewOptions(ParameterSet):
     """Options of the satellite_view node."""
 
     world: str = parameter(
@@ -68,7 +68,7 @@ class SatelliteViewOptions:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.pose_source == 'mavlink' and not self.pose_mavlink:
             raise ConfigurationError(
                 'parameter pose_source = mavlink without pose_mavlink: say where the autopilot is'
@@ -82,7 +82,7 @@ class SatelliteViewOptions:
 
 
 @dataclass(frozen=True)
-class AutopilotSimOptions:
+class AutopilotSimOptions(ParameterSet):
     """Options of the autopilot_sim node."""
 
     pose_rate: float = parameter(
@@ -91,9 +91,6 @@ class AutopilotSimOptions:
     publish_clock: bool = parameter(
         False, 'Publish /clock also at speed 1 (at any other speed it always is)'
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 SATELLITE_VIEW: tuple[Group, ...] = (('', SatelliteViewOptions), ('', CameraOptions))

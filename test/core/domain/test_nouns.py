@@ -18,7 +18,7 @@ from peace_ros.core.domain import (
     Setpoint,
     is_safe,
 )
-from peace_ros.core.domain.parameters import check, describe, parameter
+from peace_ros.core.domain.parameters import ParameterSet, describe, parameter
 
 
 @pytest.mark.parametrize(
@@ -64,12 +64,9 @@ def test_zero_is_exactly_zero() -> None:
 
 
 @dataclass(frozen=True)
-class _Parameters:
+class _Parameters(ParameterSet):
     gain: float = parameter(0.5, 'Proportional gain.', unit='1/s', low=0.0, high=2.0)
     mode: str = parameter('a', 'Which.', choices=('a', 'b'))
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 def test_parameters_know_their_unit_and_bounds() -> None:

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from peace_ros.core.domain import BundleError
-from peace_ros.core.inference import Bundle, Manifest, open_sessions
+from peace_ros.core.inference import Bundle, open_sessions
 from peace_ros.core.inference.contract import Graph, Tensor, check_graphs
+from peace_ros.core.inference.manifest import Manifest
 
 FLOAT, INT64 = 'tensor(float)', 'tensor(int64)'
 

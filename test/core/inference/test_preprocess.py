@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import ImageError
-from peace_ros.core.inference import InputSpec, Preprocessor
+from peace_ros.core.inference import Preprocessor
+from peace_ros.core.inference.manifest import InputSpec
 from peace_ros.core.inference.preprocess import MAX_PIXELS
 
 MEAN, STD = (0.48, 0.46, 0.41), (0.27, 0.26, 0.28)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from peace_ros.core.inference import TextCache
+from peace_ros.core.inference.text_cache import TextCache
 
 CHECKSUM = 'ab' * 32
 VALUE = np.arange(4, dtype=np.float32)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from peace_ros.core.domain import BundleError, ConfigurationError
-from peace_ros.core.inference import Tokenizer
+from peace_ros.core.inference.tokenizer import Tokenizer
 
 
 @pytest.fixture

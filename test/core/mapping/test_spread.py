@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import radians
 
 import numpy as np
@@ -11,9 +12,10 @@ import pytest
 
 from peace_ros.core.domain import Camera, DepthImage, Pose
 from peace_ros.core.domain.geometry import quaternion_from_euler
-from peace_ros.core.mapping import MapParameters
+from peace_ros.core.mapping import MapParameters, SafetyMap
 from peace_ros.core.mapping import flatness as steps
-from peace_ros.core.mapping.flatness import Roughness, rough_and_flat
+from peace_ros.core.mapping import safety_map as mapped
+from peace_ros.core.mapping.flatness import rough_and_flat
 from peace_ros.core.mapping.projection import GroundGrid
 
 CAMERA = Camera.from_degrees(352, 352, 73.0)
@@ -148,19 +150,20 @@ def test_points_beyond_the_grid_are_left_out(shift: tuple[float, float]) -> None
     assert np.array_equal(flat, whole[row : row + 8, column : column + 8])
 
 
-def test_the_last_measurement_of_a_cell_counts_and_the_rest_stays() -> None:
-    roughness = Roughness(4)
-    everything = (slice(0, 4), slice(0, 4))
-    rough, flat = np.zeros((4, 4), np.bool_), np.zeros((4, 4), np.bool_)
-    rough[1, 2] = rough[3, 0] = True
-    roughness.take(rough, flat)
-    flat[3, 0] = True
-    roughness.take(np.zeros((4, 4), np.bool_), flat)
-    assert np.argwhere(roughness.closed(*everything)).tolist() == [[1, 2]]
-    assert np.argwhere(roughness.closed(slice(1, 3), slice(2, 4))).tolist() == [[0, 0]]
-    roughness.shift(1, -1)
-    assert np.argwhere(roughness.closed(*everything)).tolist() == [[0, 3]]
-    roughness.widen(np.ones((3, 3), np.uint8))
-    assert np.argwhere(roughness.closed(*everything)).tolist() == [[0, 2], [0, 3], [1, 2], [1, 3]]
-    roughness.clear()
-    assert not roughness.closed(*everything).any()
+def test_the_last_measurement_of_a_cell_counts_and_the_rest_stays(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    safety_map = SafetyMap(MapParameters(map_size_m=20.0))
+    depth = depth_of(np.full((4, 4), 8.0))
+    rough, flat, nothing = (np.zeros((40, 40), np.bool_) for _ in range(3))
+    measured = [(rough, nothing), (nothing, flat), (nothing, nothing)]
+    monkeypatch.setattr(mapped, 'rough_and_flat', lambda *_: measured.pop(0))
+    rough[1, 2] = rough[3, 0] = flat[3, 0] = True
+    safety_map.add_depth(depth, CAMERA, LEVEL)
+    safety_map.add_depth(depth, CAMERA, LEVEL)
+    assert np.argwhere(safety_map._rough).tolist() == [[1, 2]]
+    away = replace(LEVEL, north_m=LEVEL.north_m - 2.5, east_m=LEVEL.east_m - 3.0)
+    safety_map.add_depth(depth, CAMERA, away)
+    assert np.argwhere(safety_map._rough).tolist() == [[6, 8]], 'five and six cells further'
+    safety_map.clear()
+    assert not safety_map._rough.any()

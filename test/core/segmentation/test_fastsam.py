@@ -23,6 +23,7 @@ from peace_ros.core.segmentation import (
     Terms,
     create_segmenter,
 )
+from peace_ros.core.segmentation.fastsam.letterbox import fitted
 
 
 def _load_bundles() -> Any:
@@ -276,8 +277,9 @@ def test_the_heatmap_covers_the_frame_and_not_the_borders(
     width, height = size
     image = np.full((height, width, 3), RED, np.uint8)
     image[:, width // 2 :] = GREEN
-    place = make()._letterbox.place(width, height)
-    cells = [place.left_px / 4, place.top_px / 4, place.right_px / 4, place.bottom_px / 4]
+    place = fitted(width, height, make()._manifest.input)
+    ends = (place.left_px + place.width_px, place.top_px + place.height_px)
+    cells = [each / 4 for each in (place.left_px, place.top_px, *ends)]
     middle = round((cells[0] + cells[2]) / 2)
     top, bottom = int(cells[1]), round(cells[3] + 0.49)
     whole = (Patch(0, top, middle, bottom), Patch(middle, top, 16, bottom))

@@ -10,15 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from peace_ros.core.inference import InputSpec
-from peace_ros.core.segmentation.fastsam import (
-    Detections,
-    Letterbox,
-    Placement,
-    Segment,
-    assemble,
-    detect,
-)
+from peace_ros.core.inference.manifest import InputSpec
+from peace_ros.core.segmentation.fastsam.letterbox import Letterbox, Placement, fitted
+from peace_ros.core.segmentation.fastsam.masks import Detections, Segment, assemble, detect
 
 REFERENCE = Path(__file__).parents[2] / 'data' / 'fastsam' / 'reference.npz'
 SIDE_PX, CELL_PX = 160, 4
@@ -82,16 +76,14 @@ def test_the_letterbox_is_that_of_the_reference(reference: dict[str, Any], case:
 
 
 def test_masks_end_where_the_frame_ends(reference: dict[str, Any]) -> None:
-    place = Letterbox(SPEC).place(130, 93)
+    place = fitted(130, 93, SPEC)
     prototypes = reference['wide/prototypes'].astype(np.float32)
     detections = found(reference, 'wide')
     whole = {each.confidence: each for each in assemble(detections, prototypes, CELL_PX, WHOLE)}
     inside = assemble(detections, prototypes, CELL_PX, place)
     assert inside
     for segment in inside:
-        within = full(whole[segment.confidence])[
-            place.top_px : place.bottom_px, place.left_px : place.right_px
-        ]
+        within = full(whole[segment.confidence])[place.slices]
         part = within[segment.rows, segment.columns]
         np.testing.assert_array_equal(part, segment.mask)
         assert segment.area_px == np.count_nonzero(within)
@@ -99,13 +91,13 @@ def test_masks_end_where_the_frame_ends(reference: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize(('width', 'height'), [(1, 3000), (3000, 1), (1, 1), (161, 159)])
 def test_any_frame_finds_its_place(width: int, height: int) -> None:
-    place = Letterbox(SPEC).place(width, height)
+    place = fitted(width, height, SPEC)
     assert place.left_px >= 0
     assert place.top_px >= 0
     assert place.width_px >= 1
     assert place.height_px >= 1
-    assert place.right_px <= SIDE_PX
-    assert place.bottom_px <= SIDE_PX
+    assert place.left_px + place.width_px <= SIDE_PX
+    assert place.top_px + place.height_px <= SIDE_PX
 
 
 def test_nothing_sure_is_nothing_found() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from peace_ros.core.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
-from peace_ros.core.domain.parameters import check, describe, parameter
+from peace_ros.core.domain.parameters import ParameterSet, describe, parameter
 from peace_ros.core.inference import Bundle
 from peace_ros.core.node_parameters import groups_of, named
 from peace_ros.core.pipeline import Pipeline
@@ -66,11 +66,8 @@ def test_each_family_has_its_own_parameters_and_only_the_common_ones_are_shared(
 
 
 @dataclass(frozen=True)
-class GreenParameters:
+class GreenParameters(ParameterSet):
     green_gain: float = parameter(4.0, 'Score per share of green', low=0.1, high=100.0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class GreenSegmenter(Segmenter):

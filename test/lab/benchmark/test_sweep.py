@@ -13,8 +13,7 @@ import typer
 from typer.testing import CliRunner
 
 from peace_ros.cli import benchmark as command
-from peace_ros.core.inference import available_providers
-from peace_ros.core.inference.providers import CPU
+from peace_ros.core.inference.providers import CPU, available_providers
 from peace_ros.lab.benchmark import sweep as sweep_module
 from peace_ros.lab.benchmark.sweep import measure_setting, settings, sweep_table
 

@@ -20,7 +20,8 @@ pytest.importorskip('transformers')
 from transformers.models.clip.image_processing_pil_clip import CLIPImageProcessorPil
 from transformers.models.vit.image_processing_pil_vit import ViTImageProcessorPil
 
-from peace_ros.core.inference import Preprocessor, Tokenizer
+from peace_ros.core.inference import Preprocessor
+from peace_ros.core.inference.tokenizer import Tokenizer
 from peace_ros.lab.export.sources import default_input
 from peace_ros.lab.export.vocabulary import shipped_vocabulary
 

@@ -2,19 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """FastSAM: segments once per frame, all of them scored by CLIP in one batch."""
 
-from peace_ros.core.segmentation.fastsam.detections import Detections, detect
-from peace_ros.core.segmentation.fastsam.letterbox import Letterbox, Placement
-from peace_ros.core.segmentation.fastsam.masks import Segment, assemble
 from peace_ros.core.segmentation.fastsam.parameters import FastSamParameters
 from peace_ros.core.segmentation.fastsam.segmenter import FastSamSegmenter
 
-__all__ = [
-    'Detections',
-    'FastSamParameters',
-    'FastSamSegmenter',
-    'Letterbox',
-    'Placement',
-    'Segment',
-    'assemble',
-    'detect',
-]
+__all__ = ['FastSamParameters', 'FastSamSegmenter']

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.inference.manifest import InputSpec
-from peace_ros.core.segmentation.fastsam.letterbox import Placement, normalisation
+from peace_ros.core.inference.preprocess import normalisation
+from peace_ros.core.segmentation.fastsam.letterbox import Placement, fitted
 from peace_ros.core.segmentation.fastsam.masks import Segment
 
 
@@ -63,18 +64,13 @@ class Cutter:
         self, cut: NDArray[np.float32], part: NDArray[np.uint8], mask: NDArray[np.bool_]
     ) -> None:
         """Write one part of the frame, masked, into the middle of a 3 x H x W array of zeros."""
-        part_height, part_width = part.shape[:2]
-        scale = min(self._spec.width / part_width, self._spec.height / part_height)
-        width = max(1, min(self._spec.width, round(part_width * scale)))
-        height = max(1, min(self._spec.height, round(part_height * scale)))
+        place = fitted(part.shape[1], part.shape[0], self._spec)
+        size = (place.width_px, place.height_px)
+        shrinks = min(self._spec.width / part.shape[1], self._spec.height / part.shape[0]) < 1.0
         # Averaging keeps a shrunk image free of aliases; CLIP's own scaling is bicubic otherwise.
-        method = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_CUBIC
-        scaled = cv2.resize(np.ascontiguousarray(part), (width, height), interpolation=method)
-        shown = (
-            cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
-            > 0.5
-        )
-        top, left = (self._spec.height - height) // 2, (self._spec.width - width) // 2
-        window = cut[:, top : top + height, left : left + width]
+        method = cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC
+        scaled = cv2.resize(np.ascontiguousarray(part), size, interpolation=method)
+        shown = cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_LINEAR) > 0.5
+        rows, columns = place.slices
         levels = cv2.LUT(scaled, self._table)
-        np.multiply(levels.transpose(2, 0, 1), shown, out=window)
+        np.multiply(levels.transpose(2, 0, 1), shown, out=cut[:, rows, columns])

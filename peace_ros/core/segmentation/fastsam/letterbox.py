@@ -5,18 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from peace_ros.core.domain import ImageError
-from peace_ros.core.inference.preprocess import MAX_PIXELS
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from peace_ros.core.inference.manifest import InputSpec
+from peace_ros.core.inference.manifest import InputSpec
+from peace_ros.core.inference.preprocess import normalisation, refuse_too_large
 
 BORDER_LEVEL = 114
 """Grey of the borders that the YOLO family is trained with."""
@@ -32,23 +27,20 @@ class Placement:
     height_px: int
 
     @property
-    def right_px(self) -> int:
-        """First column beyond the frame."""
-        return self.left_px + self.width_px
-
-    @property
-    def bottom_px(self) -> int:
-        """First row beyond the frame."""
-        return self.top_px + self.height_px
+    def slices(self) -> tuple[slice, slice]:
+        """Rows and columns of the frame."""
+        return (
+            slice(self.top_px, self.top_px + self.height_px),
+            slice(self.left_px, self.left_px + self.width_px),
+        )
 
 
-def normalisation(spec: InputSpec) -> tuple[NDArray[np.float32], ...]:
-    """Return per channel (RGB) what each of the 256 levels becomes: (level / 255 - mean) / std."""
-    levels = np.arange(256, dtype=np.float32) / np.float32(255.0)
-    return tuple(
-        ((levels - np.float32(mean)) / np.float32(std)).astype(np.float32)
-        for mean, std in zip(spec.mean, spec.std, strict=True)
-    )
+def fitted(width_px: int, height_px: int, spec: InputSpec) -> Placement:
+    """Return where a picture of this size goes in an input: as large as fits, in the middle."""
+    scale = min(spec.width / width_px, spec.height / height_px)
+    width = max(1, min(spec.width, round(width_px * scale)))
+    height = max(1, min(spec.height, round(height_px * scale)))
+    return Placement((spec.width - width) // 2, (spec.height - height) // 2, width, height)
 
 
 class Letterbox:
@@ -58,14 +50,6 @@ class Letterbox:
         self._spec = spec
         self._tables = normalisation(spec)
         self._buffer = np.zeros((1, 3, spec.height, spec.width), np.float32)
-
-    def place(self, width_px: int, height_px: int) -> Placement:
-        """Return where a frame of this size goes: as large as fits, in the middle."""
-        spec = self._spec
-        scale = min(spec.width / width_px, spec.height / height_px)
-        width = max(1, min(spec.width, round(width_px * scale)))
-        height = max(1, min(spec.height, round(height_px * scale)))
-        return Placement((spec.width - width) // 2, (spec.height - height) // 2, width, height)
 
     def __call__(self, image_rgb: NDArray[np.uint8]) -> tuple[NDArray[np.float32], Placement]:
         """Return float32 [1, 3, H, W], overwritten by the next call, and the frame's place in it.
@@ -77,12 +61,8 @@ class Letterbox:
             ImageError: more than MAX_PIXELS pixels.
         """
         height, width = image_rgb.shape[:2]
-        if height * width > MAX_PIXELS:
-            raise ImageError(
-                f'image of {width} x {height} px: at most {MAX_PIXELS} px are taken; '
-                'let the camera driver scale it down'
-            )
-        place = self.place(width, height)
+        refuse_too_large(image_rgb)
+        place = fitted(width, height, self._spec)
         scaled = image_rgb
         if (width, height) != (place.width_px, place.height_px):
             # Bilinear whatever the scale: so the reference scales, and so its weights were trained.
@@ -94,9 +74,7 @@ class Letterbox:
                 ),
                 np.uint8,
             )
-        rows = slice(place.top_px, place.bottom_px)
-        columns = slice(place.left_px, place.right_px)
         for channel, table in enumerate(self._tables):
             self._buffer[0, channel] = table[BORDER_LEVEL]
-            self._buffer[0, channel, rows, columns] = table[scaled[:, :, channel]]
+            self._buffer[0, channel][place.slices] = table[scaled[:, :, channel]]
         return self._buffer, place

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Detections and prototypes -> masks at the resolution of the network's input."""
+"""What the segmenter answers -> boxes -> masks at the resolution of the network's input."""
 
 from __future__ import annotations
 
@@ -11,13 +11,28 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.segmentation.fastsam.detections import Detections
 from peace_ros.core.segmentation.fastsam.letterbox import Placement
 
+MOST_CANDIDATES = 4096
+"""Boxes that enter the suppression: those of the highest confidence."""
+MOST_DETECTIONS = 300
+"""Boxes that leave it, as in the reference implementation."""
 STABILITY_OFFSET = 1.0
 """How far the mask's logit is moved up and down to see whether its outline stays (as SAM does)."""
 _MARGIN_CELLS = 2
 """Prototype cells around a box that bilinear scaling reads."""
+
+
+@dataclass(frozen=True)
+class Detections:
+    """N detected segments, by falling confidence."""
+
+    boxes: NDArray[np.float32]
+    """[N, 4]: left, top, right, bottom in pixels of the network's input, each of some area."""
+    confidences: NDArray[np.float32]
+    """[N], 0 to 1."""
+    coefficients: NDArray[np.float32]
+    """[N, K]: weights of the mask prototypes."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +60,36 @@ class Segment:
     def columns(self) -> slice:
         """Columns of the mask."""
         return slice(self.left_px, self.left_px + self.mask.shape[1])
+
+
+def detect(
+    predictions: NDArray[np.float32], *, min_confidence: float, max_overlap: float
+) -> Detections:
+    """Return the confident boxes without duplicates.
+
+    Of two boxes whose intersection over union exceeds max_overlap, the one of lower confidence is
+    dropped (non-maximum suppression, by OpenCV). At most MOST_DETECTIONS are returned.
+
+    Args:
+        predictions: float32 [5 + K, A]; per anchor the box's centre x, y, width and height in
+            pixels of the network's input, its confidence and K coefficients. Finite.
+        min_confidence: boxes need a higher confidence than this, 0 to 1.
+        max_overlap: 0 to 1.
+    """
+    candidates = (predictions[4] > min_confidence) & (predictions[2:4] > 0.0).all(axis=0)
+    chosen = predictions[:, candidates].T
+    half = chosen[:, 2:4] / np.float32(2.0)
+    low, high = chosen[:, :2] - half, chosen[:, :2] + half
+    kept = cv2.dnn.NMSBoxes(
+        np.hstack([low, high - low]).tolist(),
+        chosen[:, 4],
+        min_confidence,
+        max_overlap,
+        top_k=MOST_CANDIDATES,
+    )
+    best = np.asarray(kept, np.intp)[:MOST_DETECTIONS]
+    boxes = np.hstack([low[best], high[best]])
+    return Detections(boxes, chosen[best, 4], np.ascontiguousarray(chosen[best, 5:]))
 
 
 def assemble(
@@ -90,7 +135,7 @@ def assemble(
 def _corners(boxes: NDArray[np.float32], frame: Placement) -> list[list[int]]:
     """Return the whole pixels x with left <= x < right of each box, within the frame."""
     low = [frame.left_px, frame.top_px] * 2
-    high = [frame.right_px, frame.bottom_px] * 2
+    high = [frame.left_px + frame.width_px, frame.top_px + frame.height_px] * 2
     corners: list[list[int]] = np.clip(np.ceil(boxes), low, high).astype(np.int64).tolist()
     return corners
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from peace_ros.core.domain.parameters import check, parameter
+from peace_ros.core.domain.parameters import ParameterSet, parameter
 
 
 @dataclass(frozen=True)
-class FastSamParameters:
+class FastSamParameters(ParameterSet):
     """Parameters of the family fastsam."""
 
     fastsam_max_segments: int = parameter(
@@ -50,6 +50,3 @@ class FastSamParameters:
         'the smallest one',
         choices=('least_safe', 'smallest'),
     )
-
-    def __post_init__(self) -> None:
-        check(self)

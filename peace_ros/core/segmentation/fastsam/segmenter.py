@@ -4,49 +4,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import ConfigurationError, Frame, Heatmap, Prompt
-from peace_ros.core.inference.contract import (
-    IMAGE_EMBEDDING,
-    NEGATIVE,
-    PIXEL_VALUES,
-    POSITIVE,
-    PREDICTIONS,
-    PROTOTYPES,
-    SOFTMAX_POSITIVE,
-)
+from peace_ros.core.inference import contract
 from peace_ros.core.inference.manifest import InputSpec
 from peace_ros.core.segmentation.fastsam.crops import Cutter
-from peace_ros.core.segmentation.fastsam.detections import detect
 from peace_ros.core.segmentation.fastsam.letterbox import Letterbox, Placement
-from peace_ros.core.segmentation.fastsam.masks import Segment, assemble
-from peace_ros.core.segmentation.fastsam.painting import paint
+from peace_ros.core.segmentation.fastsam.masks import Segment, assemble, detect
 from peace_ros.core.segmentation.fastsam.parameters import FastSamParameters
 from peace_ros.core.segmentation.fastsam.scoring import is_usable, term_shares
 from peace_ros.core.segmentation.fastsam.selection import Selection, select
 from peace_ros.core.segmentation.fusion import calibrated
-from peace_ros.core.segmentation.segmenter import (
-    BundleOrName,
-    BundleSegmenter,
-    SegmentationParameters,
-)
+from peace_ros.core.segmentation.segmenter import BundleSegmenter, SegmentationParameters
 from peace_ros.core.segmentation.terms import Terms
-
-
-@dataclass(frozen=True)
-class _Painted:
-    """A frame divided among its segments."""
-
-    labels: NDArray[np.int32]
-    """h x w, see :func:`paint`."""
-    shares: NDArray[np.float32]
-    """[1 + N, T]; row UNKNOWN is zero."""
-    safety: NDArray[np.float32]
-    """[1 + N]; the first, of unknown ground, is zero."""
 
 
 class FastSamSegmenter(BundleSegmenter):
@@ -56,48 +28,28 @@ class FastSamSegmenter(BundleSegmenter):
     ROLES = ('segmenter', 'image_encoder', 'text_encoder')
     MEASURED_WITH = 'softmax'
 
-    def __init__(
-        self,
-        bundle: BundleOrName,
-        terms: Terms,
-        parameters: SegmentationParameters,
-        own: FastSamParameters | None = None,
-    ) -> None:
-        """Open the bundle's graphs and run them once.
-
-        Args:
-            bundle: of the family ``fastsam``.
-            terms: what to look for.
-            parameters: of the segmentation; its bundle and terms are those given here.
-            own: of the family; None: as they are declared.
-
-        Raises:
-            BundleError: the bundle is of another family or its graphs do not fit it.
-            ConfigurationError: an execution provider is not available, or there is no negative
-                term.
-        """
+    def _check_terms(self, terms: Terms, parameters: SegmentationParameters) -> None:  # noqa: ARG002
         if not terms.negative:
             raise ConfigurationError(
                 'family fastsam without negative terms would call every segment safe, because '
                 'the terms share each segment among them: name negative terms or choose clipseg'
             )
-        super().__init__(bundle, terms, parameters)
+
+    def _warm_up(self, own: FastSamParameters | None) -> None:
         self._own = own or FastSamParameters()
         self._letterbox = Letterbox(self._manifest.input)
         self._cutter = Cutter(self._manifest.encoder_input, self._own.fastsam_max_segments)
-        self._warm_up()
-        self._loaded()
-
-    def _warm_up(self) -> None:
         size = self._manifest.input
         pixels, _ = self._letterbox(np.zeros((size.height, size.width, 3), np.uint8))
         predictions, prototypes = self._sessions['segmenter'].warm_up(
-            [PREDICTIONS, PROTOTYPES], {PIXEL_VALUES: pixels}
+            [contract.PREDICTIONS, contract.PROTOTYPES], {contract.PIXEL_VALUES: pixels}
         )
         self._cell_px = self._checked_cell_px(predictions, prototypes, size)
         # The largest batch: no later frame then waits for memory.
         crops = self._cutter.blank()
-        self._sessions['image_encoder'].warm_up([IMAGE_EMBEDDING], {PIXEL_VALUES: crops})
+        self._sessions['image_encoder'].warm_up(
+            [contract.IMAGE_EMBEDDING], {contract.PIXEL_VALUES: crops}
+        )
 
     def _checked_cell_px(
         self, predictions: NDArray[np.float32], prototypes: NDArray[np.float32], size: InputSpec
@@ -109,8 +61,8 @@ class FastSamSegmenter(BundleSegmenter):
         if predictions.shape[1] != 5 + count or not fits:
             raise self._unusable(
                 'segmenter',
-                f'{PREDICTIONS} {predictions.shape} and {PROTOTYPES} {prototypes.shape} for an '
-                f'input of {size.width} x {size.height} px',
+                f'{contract.PREDICTIONS} {predictions.shape} and {contract.PROTOTYPES} '
+                f'{prototypes.shape} for an input of {size.width} x {size.height} px',
             )
         return cell_px
 
@@ -124,9 +76,8 @@ class FastSamSegmenter(BundleSegmenter):
         Raises ImageError for an image that cannot be used, BundleError for an answer of the
         networks that cannot be used.
         """
-        painted = self._paint(frame, prompt)
-        safety = calibrated(painted.safety, self._threshold)
-        return Heatmap(safety[painted.labels], frame.stamp_ns)
+        labels, _, safety = self._paint(frame, prompt)
+        return Heatmap(calibrated(safety, self.threshold)[labels], frame.stamp_ns)
 
     def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:
         """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``.
@@ -134,8 +85,8 @@ class FastSamSegmenter(BundleSegmenter):
         Where segments overlap, all maps show the scores of the one that ``segment`` shows. On
         unknown ground every term is 0.
         """
-        painted = self._paint(frame, prompt)
-        return np.ascontiguousarray(painted.shares.T)[:, painted.labels]
+        labels, shares, _ = self._paint(frame, prompt)
+        return np.ascontiguousarray(shares.T)[:, labels]
 
     def segments(self, frame: Frame) -> Selection:
         """Return the segments of a frame without scoring them."""
@@ -144,7 +95,7 @@ class FastSamSegmenter(BundleSegmenter):
     def _find(self, frame: Frame) -> tuple[Selection, Placement]:
         pixels, place = self._letterbox(frame.image_rgb)
         predictions, prototypes = self._sessions['segmenter'].run(
-            [PREDICTIONS, PROTOTYPES], {PIXEL_VALUES: pixels}
+            [contract.PREDICTIONS, contract.PROTOTYPES], {contract.PIXEL_VALUES: pixels}
         )
         if not (np.isfinite(predictions).all() and np.isfinite(prototypes).all()):
             raise self._unusable('segmenter', 'boxes or masks that are not finite')
@@ -157,7 +108,13 @@ class FastSamSegmenter(BundleSegmenter):
         frame_px = place.width_px * place.height_px
         return select(segments, frame_px, self._own), place
 
-    def _paint(self, frame: Frame, prompt: Prompt) -> _Painted:
+    def _paint(
+        self, frame: Frame, prompt: Prompt
+    ) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]:
+        """Return the labels (see :meth:`Selection.paint`), and of each the terms and the safety.
+
+        h x w; [1 + N, T]; [1 + N]: of unknown ground (label 0) both are zero.
+        """
         selection, place = self._find(frame)
         terms = self._embeddings(prompt)
         shares = self._shares(frame, selection.scored, place, terms)
@@ -166,12 +123,8 @@ class FastSamSegmenter(BundleSegmenter):
             order = np.argsort(-safety, kind='stable')
         else:
             order = np.arange(len(safety))  # largest first already
-        labels = paint(selection, order.tolist(), place.height_px, place.width_px)
-        return _Painted(
-            labels,
-            np.concatenate([np.zeros((1, len(self.terms)), np.float32), shares]),
-            np.concatenate([np.zeros(1, np.float32), safety]),
-        )
+        labels = selection.paint(order.tolist(), place.height_px, place.width_px)
+        return labels, np.pad(shares, ((1, 0), (0, 0))), np.pad(safety, (1, 0))
 
     def _shares(
         self, frame: Frame, segments: list[Segment], place: Placement, terms: NDArray[np.float32]
@@ -180,7 +133,7 @@ class FastSamSegmenter(BundleSegmenter):
             return np.zeros((0, len(self.terms)), np.float32)
         crops = self._cutter(frame.image_rgb, segments, place)
         (embeddings,) = self._sessions['image_encoder'].run(
-            [IMAGE_EMBEDDING], {PIXEL_VALUES: crops}
+            [contract.IMAGE_EMBEDDING], {contract.PIXEL_VALUES: crops}
         )
         if embeddings.shape != (len(segments), terms.shape[1]) or not is_usable(embeddings):
             raise self._unusable('image_encoder', f'embeddings of shape {embeddings.shape}')
@@ -190,9 +143,9 @@ class FastSamSegmenter(BundleSegmenter):
         """Return the fused score of each segment, [N] float32, 0 to 1."""
         positive, negative = np.split(shares, [len(self.terms.positive)], axis=1)
         scores = {
-            POSITIVE: positive.max(axis=1),
-            NEGATIVE: negative.max(axis=1),
-            SOFTMAX_POSITIVE: positive.sum(axis=1),
+            contract.POSITIVE: positive.max(axis=1),
+            contract.NEGATIVE: negative.max(axis=1),
+            contract.SOFTMAX_POSITIVE: positive.sum(axis=1),
         }
         fused = self._fusion.combine(*(scores[name] for name in self._fusion.outputs))
         return np.clip(fused, np.float32(0.0), np.float32(1.0))

@@ -4,10 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from peace_ros.core.segmentation.fastsam.masks import Segment
 from peace_ros.core.segmentation.fastsam.parameters import FastSamParameters
+
+UNKNOWN = 0
+"""Label of pixels that no scored segment covers."""
 
 
 @dataclass(frozen=True)
@@ -18,6 +25,25 @@ class Selection:
     """The largest ones, largest first: CLIP tells what they are."""
     unknown: list[Segment]
     """Too small, or beyond the cap: something is there, and nobody looks what it is."""
+
+    def paint(self, order: Sequence[int], height_px: int, width_px: int) -> NDArray[np.int32]:
+        """Return per pixel 1 + the index of the scored segment that decides for it, or UNKNOWN.
+
+        Where segments overlap, the last one in order decides. Segments that were not scored come
+        after all others: what they show is not known.
+
+        Args:
+            order: indices of all scored segments.
+            height_px: of the frame at the resolution of the segments.
+            width_px: likewise.
+        """
+        labels = np.zeros((height_px, width_px), np.int32)
+        for segment, label in (
+            *((self.scored[index], index + 1) for index in order),
+            *((segment, UNKNOWN) for segment in self.unknown),
+        ):
+            labels[segment.rows, segment.columns][segment.mask] = label
+        return labels
 
 
 def select(segments: list[Segment], frame_px: int, parameters: FastSamParameters) -> Selection:

@@ -13,9 +13,9 @@ from torch import Tensor
 
 from peace_ros.core.domain import Label
 from peace_ros.core.inference.manifest import InputSpec
-from peace_ros.core.segmentation.fastsam import Placement, Segment
 from peace_ros.core.segmentation.fastsam.crops import Cutter
-from peace_ros.core.segmentation.fastsam.letterbox import BORDER_LEVEL
+from peace_ros.core.segmentation.fastsam.letterbox import BORDER_LEVEL, Placement
+from peace_ros.core.segmentation.fastsam.masks import Segment
 from peace_ros.lab.training.annotations import PIXEL_CLASS_COUNT
 from peace_ros.lab.training.arrays import Image, Rng
 from peace_ros.lab.training.backbone import MEAN, STD
