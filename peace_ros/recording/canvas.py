@@ -56,7 +56,6 @@ def save_picture(image: Image, path: Path) -> None:
 
     Raises:
         RecordingError: the place cannot be written to.
-
     """
     stored = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
     done, data = cv2.imencode(path.suffix, stored)

@@ -38,7 +38,6 @@ def draw_contact_sheet(cells: list[Cell], title: str) -> Image:
 
     Raises:
         RecordingError: there is no cell at all.
-
     """
     if not cells:
         raise RecordingError('a contact sheet of 0 pictures cannot be drawn: nothing was seen')

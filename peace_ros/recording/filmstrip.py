@@ -57,7 +57,6 @@ def draw_filmstrip(moments: list[FilmMoment], title: str = '') -> Image:
 
     Raises:
         RecordingError: there is no moment at all.
-
     """
     if not moments:
         raise RecordingError('a filmstrip of 0 moments cannot be drawn: no state was recorded')

@@ -133,7 +133,6 @@ def draw_trajectory(scene: TrajectoryScene) -> Image:
 
     Raises:
         RecordingError: the track is empty.
-
     """
     if not scene.track:
         raise RecordingError('a trajectory of 0 points cannot be drawn: no pose was recorded')

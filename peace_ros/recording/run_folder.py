@@ -23,7 +23,6 @@ def create_run_folder(chosen: Path | None, name: str, option: str) -> Path:
 
     Raises:
         ConfigurationError: it holds something already or cannot be created.
-
     """
     try:
         if chosen is None:
@@ -56,7 +55,6 @@ def write_whole(path: Path, content: bytes | str, what: str) -> None:
 
     Raises:
         RecordingError: the place cannot be written to; the message begins with ``what``.
-
     """
     partial = path.with_name(f'.{path.name}.partial')
     try:

@@ -43,7 +43,6 @@ class ReplayOutputs:
             frames: about how many frames will come, to spread the contact sheet over them.
             video_hz: frame rate of the overlay video; None writes none.
             title: of the contact sheet.
-
         """
         self._folder = folder
         self._every = max(1, frames // _CELLS)

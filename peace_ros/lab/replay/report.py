@@ -67,7 +67,6 @@ class ReplayReport:
 
         Raises:
             RecordingError: the place cannot be written to.
-
         """
         content = {
             **asdict(self),

@@ -103,7 +103,6 @@ class Summary:
 
         Raises:
             RecordingError: the place cannot be written to.
-
         """
         write_whole(path, self.as_json(), 'summary')
 
