@@ -13,7 +13,8 @@ from rich.markdown import Markdown
 from rich.progress import track
 from typer import Option
 
-from peace_ros.cli.image_options import ImageOptions, with_image_options
+from peace_ros.cli.image_options import ImageOptions
+from peace_ros.cli.options import with_options
 from peace_ros.lab.evaluation.ablation.figures import ablation_figures
 from peace_ros.lab.evaluation.ablation.run import ablate as run_ablation
 from peace_ros.lab.evaluation.ablation.table import markdown, put_into
@@ -22,7 +23,7 @@ from peace_ros.lab.evaluation.segmentation.cores import build_cores
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError
 
 
-@with_image_options
+@with_options(ImageOptions)
 def ablate(
     *,
     options: ImageOptions,

@@ -13,7 +13,8 @@ from rich.console import Console
 from rich.progress import track
 from typer import Argument, Option
 
-from peace_ros.cli.image_options import ImageOptions, with_image_options
+from peace_ros.cli.image_options import ImageOptions
+from peace_ros.cli.options import with_options
 from peace_ros.core.segmentation import FUSIONS
 from peace_ros.lab.evaluation.segmentation.cores import Cores, Overrides, build_cores
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError
@@ -30,7 +31,7 @@ DEFAULT_CONFIG = 'peace_cs'
 ALL_CONFIGS = ('dd_cs', 'd_cs', 'peace_cs', 'dd_fs', 'd_fs', 'peace_fs')
 
 
-@with_image_options
+@with_options(ImageOptions)
 def evaluate(
     *,
     options: ImageOptions,

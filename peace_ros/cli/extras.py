@@ -13,7 +13,7 @@ EXTRA_OF = {
     'rosbags': 'simulation',
     'rasterio': 'geo',
     'jinja2': 'lab',
-    'matplotlib': 'lab',
+    'matplotlib': 'simulation',
     'pooch': 'fetch',
     'requests': 'fetch',
     'openvino': 'openvino',

@@ -1,16 +1,14 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Options that commands over labelled images share, declared once as the fields of a class."""
+"""Options that commands over labelled images share."""
 
 from __future__ import annotations
 
-import functools
-import inspect
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any
 
 from typer import Option
 
@@ -77,24 +75,3 @@ class ImageOptions(EvaluationInputs):
             also()
         except OSError as error:
             raise DatasetError(f'{error.filename} cannot be written: {error.strerror}') from error
-
-
-def with_image_options(verb: Callable[..., None]) -> Callable[..., None]:
-    """Give a verb the fields of ImageOptions as options; it gets them as ``options``."""
-
-    @functools.wraps(verb)
-    def run(**given: Any) -> None:
-        names = [each.name for each in fields(ImageOptions)]
-        verb(options=ImageOptions(**{name: given.pop(name) for name in names}), **given)
-
-    kind, hints = inspect.Parameter.KEYWORD_ONLY, get_type_hints(ImageOptions, include_extras=True)
-    shared = [
-        inspect.Parameter(each.name, kind, default=each.default, annotation=hints[each.name])
-        for each in fields(ImageOptions)
-    ]
-    own = dict(inspect.signature(verb, eval_str=True).parameters)
-    del own['options']
-    parameters = [*own.values(), *shared]
-    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {each.name: each.annotation for each in parameters}
-    return run

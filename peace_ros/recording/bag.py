@@ -80,7 +80,6 @@ class BagReader:
 
         Raises:
             RecordingError: it is not a bag, is cut short, or is of an unknown kind.
-
         """
         try:
             reader = AnyReader([self.path], default_typestore=TYPESTORE)
@@ -111,7 +110,6 @@ class BagReader:
 
         Raises:
             RecordingError: no such topic, or it has another type; lists the topics that would do.
-
         """
         there = self.topics
         if topic not in there:
@@ -133,7 +131,6 @@ class BagReader:
 
         Raises:
             RecordingError: the file ends early or holds bytes that are no such message.
-
         """
         for topic in topics:
             self.require(topic, tuple(self.topics.values()))
@@ -189,7 +186,6 @@ class BagWriter:
 
         Raises:
             RecordingError: the place cannot be written to.
-
         """
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -231,7 +227,6 @@ class BagWriter:
 
         Raises:
             RecordingError: the type is not one of ROS 2 Jazzy.
-
         """
         if topic in self._connections:
             return
@@ -253,7 +248,6 @@ class BagWriter:
 
         Raises:
             RecordingError: the topic was not added, or the disk refuses.
-
         """
         if topic not in self._connections:
             raise RecordingError(f'topic {topic} was not added to bag {self.path}: add it first')

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,8 @@ _CELL_PX = 300
 _CAPTION_PX = 62
 _GAP_PX = 10
 _COLUMNS = 5
+_LETTERS = 48
+"""In a line of details."""
 
 
 @dataclass(frozen=True)
@@ -35,24 +38,20 @@ def draw_contact_sheet(cells: list[Cell], title: str) -> Image:
 
     Raises:
         RecordingError: there is no cell at all.
-
     """
     if not cells:
         raise RecordingError('a contact sheet of 0 pictures cannot be drawn: nothing was seen')
     columns = min(_COLUMNS, len(cells))
     rows = -(-len(cells) // columns)
-    width = columns * (_CELL_PX + _GAP_PX) + _GAP_PX
-    sheet = canvas.blank(width, 50 + rows * (_CELL_PX + _CAPTION_PX + _GAP_PX))
-    canvas.put_text(sheet, title, (_GAP_PX, 33), scale=0.65, thickness=2)
+    wide, high = _CELL_PX + _GAP_PX, _CELL_PX + _CAPTION_PX + _GAP_PX
+    sheet = canvas.sheet(columns * wide + _GAP_PX, 50 + rows * high)
+    canvas.write(sheet, _GAP_PX, 33, title, 11, weight='bold')
     for number, cell in enumerate(cells):
         row, column = divmod(number, columns)
-        left = _GAP_PX + column * (_CELL_PX + _GAP_PX)
-        top = 50 + row * (_CELL_PX + _CAPTION_PX + _GAP_PX)
-        canvas.put_text(sheet, cell.caption, (left, top + 18), scale=0.5, thickness=1)
-        lines = canvas.wrap(cell.detail, _CELL_PX, 0.4)
-        for k, line in enumerate(lines[:2]):
-            canvas.put_text(sheet, line, (left, top + 36 + 16 * k), scale=0.4, colour=canvas.FAINT)
-        picture = canvas.fitted(cell.image_rgb, _CELL_PX)
-        y = top + _CAPTION_PX
-        sheet[y : y + picture.shape[0], left : left + picture.shape[1]] = picture
-    return sheet
+        left, top = _GAP_PX + column * wide, 50 + row * high
+        canvas.write(sheet, left, top + 18, cell.caption, 9)
+        detail = '\n'.join(textwrap.wrap(cell.detail, _LETTERS)[:2])
+        canvas.write(sheet, left, top + 36, detail, 7, color=canvas.FAINT)
+        window = canvas.window(sheet, left, top + _CAPTION_PX, _CELL_PX, _CELL_PX)
+        window.imshow(cell.image_rgb).axes.set_anchor('NW')
+    return canvas.pixels(sheet)

@@ -37,7 +37,6 @@ def fov_x_rad_of(camera_info: Any) -> float:
 
     Raises:
         RecordingError: it was never calibrated (focal length 0).
-
     """
     focal_px, width_px = float(camera_info.k[0]), int(camera_info.width)
     if not focal_px > 0.0 or width_px < 1:

@@ -1,27 +1,45 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The two pictures of a run: its trajectory over the world, and a filmstrip of its states.
+"""The picture of a run: its trajectory over the world, with a legend and altitude over time.
 
 World coordinates are metres east and north of the centre of the world image, whose top is north.
 """
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass, field
-from math import ceil
+from itertools import pairwise
+from math import ceil, floor, log10
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Rectangle
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import RecordingError
 from peace_ros.recording import canvas
-from peace_ros.recording.canvas import Image, Point
+from peace_ros.recording.canvas import Image
+
+ArtistT = TypeVar('ArtistT', bound=Artist)
 
 _MAP_PX = 1000
 _PANEL_PX = 400
 _MARGIN_M = 45.0
 _SMALLEST_VIEW_M = 120.0
+_SITE, _EARLIER_SITE, _ENGAGED = '#50e6ff', '#96bec8', '#ff78ff'
+_VERDICTS = {
+    True: ('safe', '#5adc6e'),
+    False: ('UNSAFE', '#ff5046'),
+    None: ('no ground truth', '#ffbe3c'),
+}
 
 
 @dataclass(frozen=True)
@@ -64,48 +82,46 @@ class TrajectoryScene:
     lines: tuple[str, ...] = field(default=())
     """What the panel says under the title."""
 
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """(east-west, north-south) extent of the world."""
+        height, width = self.world_rgb.shape[:2]
+        return width * self.gsd_m, height * self.gsd_m
+
+    @property
+    def top_m(self) -> float:
+        """Altitude at the upper end of the scale."""
+        highest = max(point.altitude_agl_m for point in self.track)
+        return max(20.0, 10.0 * ceil(highest / 10.0))
+
 
 class _View:
-    """A square of the world, drawn north up at ``_MAP_PX``; ground beyond the world mirrored."""
+    """A square of the world, drawn north up; ground beyond the world is mirrored."""
 
     def __init__(self, scene: TrajectoryScene) -> None:
-        easts = [point.east_m for point in scene.track] + [site.east_m for site in scene.sites]
-        norths = [point.north_m for point in scene.track] + [site.north_m for site in scene.sites]
-        self.centre = (
-            (min(easts) + max(easts)) / 2.0,
-            (min(norths) + max(norths)) / 2.0,
-        )
-        span = max(max(easts) - min(easts), max(norths) - min(norths)) + 2.0 * _MARGIN_M
-        self.span_m = max(span, _SMALLEST_VIEW_M)
-        self.m_per_px = self.span_m / _MAP_PX
-
-    def pixel(self, east_m: float, north_m: float) -> Point:
-        return (
-            round(_MAP_PX / 2 + (east_m - self.centre[0]) / self.m_per_px),
-            round(_MAP_PX / 2 - (north_m - self.centre[1]) / self.m_per_px),
-        )
+        places = [(point.east_m, point.north_m) for point in scene.track]
+        places += [(site.east_m, site.north_m) for site in scene.sites]
+        low, high = np.min(places, axis=0), np.max(places, axis=0)
+        self.span_m = max(float((high - low).max()) + 2.0 * _MARGIN_M, _SMALLEST_VIEW_M)
+        self.low_m = (low + high - self.span_m) / 2.0
+        east, north = self.low_m.tolist()
+        self.extent_m = (east, east + self.span_m, north, north + self.span_m)
 
     def picture(self, world_rgb: NDArray[np.uint8], gsd_m: float) -> Image:
         height, width = world_rgb.shape[:2]
-        per_px = self.m_per_px / gsd_m
+        per_px = self.span_m / _MAP_PX / gsd_m
+        west, _, _, north = (each / gsd_m for each in self.extent_m)
         # Pixel (u, v) of the map shows the world pixel at this affine position.
-        matrix = np.array(
-            [
-                [per_px, 0.0, (self.centre[0] / gsd_m + width / 2) - per_px * _MAP_PX / 2],
-                [0.0, per_px, (height / 2 - self.centre[1] / gsd_m) - per_px * _MAP_PX / 2],
-            ]
-        )
+        matrix = np.array([[per_px, 0.0, west + width / 2], [0.0, per_px, height / 2 - north]])
         if per_px > 2.0:
             # Warping alone would pick single pixels of a fine world; shrink it first.
-            factor = 1.0 / per_px
-            small = cv2.resize(world_rgb, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-            matrix = matrix / per_px
-        else:
-            small = world_rgb
+            factor, matrix = 1.0 / per_px, matrix / per_px
+            world_rgb = np.asarray(
+                cv2.resize(world_rgb, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+            )
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        warped = cv2.warpAffine(
-            small, matrix, (_MAP_PX, _MAP_PX), flags=flags, borderMode=cv2.BORDER_REFLECT
-        )
+        size = (_MAP_PX, _MAP_PX)
+        warped = cv2.warpAffine(world_rgb, matrix, size, flags=flags, borderMode=cv2.BORDER_REFLECT)
         return np.asarray(warped, np.uint8)
 
 
@@ -117,185 +133,135 @@ def draw_trajectory(scene: TrajectoryScene) -> Image:
 
     Raises:
         RecordingError: the track is empty.
-
     """
     if not scene.track:
         raise RecordingError('a trajectory of 0 points cannot be drawn: no pose was recorded')
     view = _View(scene)
-    ground = view.picture(scene.world_rgb, scene.gsd_m)
-    _draw_world_edge(ground, view, scene)
-    _draw_path(ground, view, scene)
-    _draw_places(ground, view, scene)
-    canvas.scale_bar(ground, (30, _MAP_PX - 40), view.m_per_px, _MAP_PX // 4)
-    canvas.north_arrow(ground, (_MAP_PX - 50, 100))
-    panel = canvas.blank(_PANEL_PX, _MAP_PX)
-    _draw_panel(panel, view, scene)
-    return np.hstack([ground, panel])
+    sheet = canvas.sheet(_MAP_PX + _PANEL_PX, _MAP_PX)
+    ground = canvas.window(sheet, 0, 0, _MAP_PX, _MAP_PX)
+    image = view.picture(scene.world_rgb, scene.gsd_m)
+    ground.imshow(image, extent=view.extent_m, interpolation='nearest')
+    east, north = scene.size_m
+    edge = Rectangle((-east / 2, -north / 2), east, north, fill=False, edgecolor='white')
+    ground.add_patch(_outlined(edge))
+    places = [(point.east_m, point.north_m) for point in scene.track]
+    ground.add_collection(_outlined(_coloured(places, scene, 4.0)))
+    marks = _draw_places(ground, scene)
+    _draw_scale(ground, view)
+    ground.axis(view.extent_m)
+    _draw_panel(sheet, scene, marks)
+    _draw_profile(canvas.window(sheet, _MAP_PX + 60, 500, _PANEL_PX - 84, 150), scene)
+    _draw_inset(canvas.window(sheet, _MAP_PX + 30, 730, _PANEL_PX - 60, 250), view, scene)
+    return canvas.pixels(sheet)
 
 
-def _draw_world_edge(ground: Image, view: _View, scene: TrajectoryScene) -> None:
-    height, width = scene.world_rgb.shape[:2]
-    half_e, half_n = width * scene.gsd_m / 2, height * scene.gsd_m / 2
-    corners = (view.pixel(-half_e, half_n), view.pixel(half_e, -half_n))
-    cv2.rectangle(ground, *corners, (0, 0, 0), 5)
-    cv2.rectangle(ground, *corners, (255, 255, 255), 2)
+def _outlined(artist: ArtistT) -> ArtistT:
+    """Let an artist show on light and dark ground."""
+    width = artist.get_linewidth() if hasattr(artist, 'get_linewidth') else 1.5
+    artist.set_path_effects([withStroke(linewidth=float(np.max(width)) + 2.5, foreground='black')])
+    return artist
 
 
-def _altitude_range(scene: TrajectoryScene) -> tuple[float, float]:
-    highest = max(point.altitude_agl_m for point in scene.track)
-    return 0.0, max(20.0, 10.0 * ceil(highest / 10.0))
+def _coloured(
+    places: list[tuple[float, float]], scene: TrajectoryScene, width: float
+) -> LineCollection:
+    """Return the line through the places of the track: blue low, red high."""
+    steps = list(pairwise(places))
+    line = LineCollection(steps, cmap='turbo', clim=(0.0, scene.top_m), linewidth=width)
+    line.set_capstyle('round')
+    line.set_array([point.altitude_agl_m for point in scene.track[1:]])
+    return line
 
 
-def _draw_path(ground: Image, view: _View, scene: TrajectoryScene) -> None:
-    pixels = [view.pixel(point.east_m, point.north_m) for point in scene.track]
-    altitudes = np.array([point.altitude_agl_m for point in scene.track])
-    colours = canvas.altitude_colours(altitudes, *_altitude_range(scene))
-    outline = np.array(pixels, np.int32).reshape(-1, 1, 2)
-    cv2.polylines(ground, [outline], False, (0, 0, 0), 9, cv2.LINE_AA)
-    for begin, end, colour in zip(pixels[:-1], pixels[1:], colours[1:], strict=True):
-        shade = tuple(int(each) for each in colour)
-        cv2.line(ground, begin, end, shade, 5, cv2.LINE_AA)
+def _draw_places(ground: Axes, scene: TrajectoryScene) -> list[Line2D]:
+    """Draw what happened where; return the symbols of the legend."""
 
+    def mark(east_m: float, north_m: float, symbol: str, colour: str, name: str) -> None:
+        style: dict[str, Any] = {'color': colour, 'markersize': 8.0, 'markeredgewidth': 2.5}
+        if symbol == 'o':
+            style['markerfacecolor'] = 'none'
+        (line,) = ground.plot(east_m, north_m, symbol, linestyle='', label=name, **style)
+        marks[name] = _outlined(line)
 
-def _draw_places(ground: Image, view: _View, scene: TrajectoryScene) -> None:
-    for number, site in enumerate(scene.sites):
-        last = number == len(scene.sites) - 1
-        at = view.pixel(site.east_m, site.north_m)
-        colour = (80, 230, 255) if last else (150, 190, 200)
-        radius = max(4, round(site.clearance_m / view.m_per_px))
-        canvas.outlined_circle(ground, at, radius, colour)
-        canvas.outlined_circle(ground, at, 3, colour)
-    start = view.pixel(scene.track[0].east_m, scene.track[0].north_m)
-    cv2.rectangle(ground, _shift(start, -8), _shift(start, 8), (0, 0, 0), -1)
-    cv2.rectangle(ground, _shift(start, -6), _shift(start, 6), (255, 255, 255), -1)
-    engaged = _engaged_point(scene)
-    if engaged is not None:
-        canvas.outlined_circle(
-            ground, view.pixel(engaged.east_m, engaged.north_m), 9, (255, 120, 255)
-        )
+    def ring(east_m: float, north_m: float, radius_m: float, colour: str) -> None:
+        shape = Circle((east_m, north_m), radius_m, fill=False, edgecolor=colour, linewidth=1.5)
+        ground.add_patch(_outlined(shape))
+
+    marks: dict[str, Line2D] = {}
+    for number, site in enumerate(scene.sites, start=1):
+        colour = _SITE if number == len(scene.sites) else _EARLIER_SITE
+        ring(site.east_m, site.north_m, site.clearance_m, colour)
+        mark(site.east_m, site.north_m, '.', colour, 'chosen site, estimated clearance')
+    first = scene.track[0]
+    name = 'start on the ground' if first.altitude_agl_m < 5.0 else 'first pose'
+    mark(first.east_m, first.north_m, 's', 'white', name)
+    if (at_s := scene.engaged_at_s) is not None:
+        point = min(scene.track, key=lambda each: abs(each.time_s - at_s))
+        mark(point.east_m, point.north_m, 'o', _ENGAGED, 'landing node engaged')
     if scene.hand_over is not None:
-        at = view.pixel(*scene.hand_over)
-        colour = _verdict_colour(scene.safe)
-        if scene.hand_over_clearance_m:
-            radius = max(4, round(scene.hand_over_clearance_m / view.m_per_px))
-            canvas.outlined_circle(ground, at, radius, colour)
-        canvas.cross(ground, at, 22, colour)
+        verdict, colour = _VERDICTS[scene.safe]
+        name = f'hand-over point ({verdict})'
+        if (clear_m := scene.hand_over_clearance_m) is not None:
+            name += f'\ntrue clearance {clear_m:.1f} m (circle)'
+            ring(*scene.hand_over, clear_m, colour)
+        mark(*scene.hand_over, 'x', colour, name)
+    return list(marks.values())
 
 
-def _engaged_point(scene: TrajectoryScene) -> TrackPoint | None:
-    if scene.engaged_at_s is None:
-        return None
-    moment = scene.engaged_at_s
-    return min(scene.track, key=lambda point: abs(point.time_s - moment))
+def nice_length_m(at_most_m: float) -> float:
+    """Return the largest of 1, 2, 5 x 10^n metres that fits."""
+    power = 10.0 ** floor(log10(max(at_most_m, 1e-3)))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= at_most_m * 1.0001)
 
 
-def _shift(at: Point, by: int) -> Point:
-    return at[0] + by, at[1] + by
+def _draw_scale(ground: Axes, view: _View) -> None:
+    """Draw a bar with its length, and an arrow to the north."""
+    length_m = nice_length_m(view.span_m / 4.0)
+    east, north = view.low_m + 0.03 * view.span_m
+    _outlined(ground.plot((east, east + length_m), (north, north), color='white', linewidth=5)[0])
+    _outlined(ground.text(east, north + 0.015 * view.span_m, f'{length_m:g} m', color='white'))
+    arrow = {'arrowstyle': 'simple', 'facecolor': 'white', 'edgecolor': 'black'}
+    ground.annotate('', (0.95, 0.95), (0.95, 0.9), 'axes fraction', arrowprops=arrow)
+    _outlined(ground.text(0.95, 0.96, 'N', color='white', ha='center', transform=ground.transAxes))
 
 
-def _verdict_colour(safe: bool | None) -> canvas.Colour:
-    if safe is None:
-        return canvas.WARN
-    return canvas.GOOD if safe else canvas.BAD
+def _draw_panel(sheet: Figure, scene: TrajectoryScene, marks: list[Line2D]) -> None:
+    title = textwrap.wrap(scene.title, 36)
+    canvas.write(sheet, _MAP_PX + 24, 44, '\n'.join(title), 12, weight='bold')
+    lines = [part for line in scene.lines for part in textwrap.wrap(line, 46)]
+    canvas.write(sheet, _MAP_PX + 24, 60 + 24 * len(title), '\n'.join(lines), 9.5)
+    corner = ((_MAP_PX + 12) / (_MAP_PX + _PANEL_PX), 0.7)
+    sheet.legend(
+        handles=marks, loc='upper left', bbox_to_anchor=corner, frameon=False,
+        labelcolor=canvas.INK, fontsize=9.5, labelspacing=0.8,
+    )  # fmt: skip
 
 
-def _draw_panel(panel: Image, view: _View, scene: TrajectoryScene) -> None:
-    y = 44
-    for line in canvas.wrap(scene.title, _PANEL_PX - 48, 0.75):
-        canvas.put_text(panel, line, (24, y), scale=0.75, thickness=2)
-        y += 30
-    y += 6
-    for text in scene.lines:
-        for line in canvas.wrap(text, _PANEL_PX - 48, 0.52):
-            canvas.put_text(panel, line, (24, y), scale=0.52)
-            y += 23
-    y = _draw_legend(panel, max(y + 14, 300), scene)
-    _draw_profile(panel, (60, y + 34), (_PANEL_PX - 84, 130), scene)
-    _draw_inset(panel, view, scene, top=y + 34 + 130 + 60)
-
-
-def _draw_legend(panel: Image, top: int, scene: TrajectoryScene) -> int:
-    """Draw the symbols that occur in the map; return the y below them."""
-    y = top
-    cv2.rectangle(panel, (30, y - 12), (42, y), (255, 255, 255), -1)
-    on_ground = scene.track[0].altitude_agl_m < 5.0
-    text = 'start on the ground' if on_ground else 'first pose'
-    canvas.put_text(panel, text, (64, y), scale=0.52)
+def _draw_profile(axes: Axes, scene: TrajectoryScene) -> None:
+    """Plot altitude over time, in the colours of the path."""
+    axes.set_axis_on()
+    axes.set(facecolor=canvas.PAPER, xlabel='s', ylabel='altitude (m)')
+    first = scene.track[0].time_s
+    places = [(point.time_s - first, point.altitude_agl_m) for point in scene.track]
+    axes.add_collection(_coloured(places, scene, 2.0))
+    axes.axis((0.0, max(places[-1][0], 1e-6), 0.0, scene.top_m))
     if scene.engaged_at_s is not None:
-        y += 30
-        canvas.outlined_circle(panel, (36, y - 6), 9, (255, 120, 255))
-        canvas.put_text(panel, 'landing node engaged', (64, y), scale=0.52)
-    if scene.sites:
-        y += 30
-        canvas.outlined_circle(panel, (36, y - 6), 10, (80, 230, 255))
-        canvas.outlined_circle(panel, (36, y - 6), 3, (80, 230, 255))
-        canvas.put_text(panel, 'chosen site, estimated clearance', (64, y), scale=0.52)
-    if scene.hand_over is not None:
-        y += 30
-        canvas.cross(panel, (36, y - 6), 16, _verdict_colour(scene.safe))
-        verdict = {True: 'safe', False: 'UNSAFE', None: 'no ground truth'}[scene.safe]
-        canvas.put_text(panel, f'hand-over point ({verdict})', (64, y), scale=0.52)
-        if scene.hand_over_clearance_m is not None:
-            y += 24
-            text = f'true clearance {scene.hand_over_clearance_m:.1f} m (circle)'
-            canvas.put_text(panel, text, (64, y), scale=0.52)
-    y += 34
-    low, high = _altitude_range(scene)
-    width = _PANEL_PX - 84
-    ramp = canvas.altitude_colours(np.linspace(low, high, width), low, high)
-    panel[y - 12 : y, 30 : 30 + width] = ramp
-    canvas.put_text(panel, f'{low:.0f}', (26, y + 18), scale=0.45)
-    canvas.put_text(panel, 'altitude (m)', (150, y + 18), scale=0.45)
-    canvas.put_text(panel, f'{high:.0f}', (30 + width - 26, y + 18), scale=0.45)
-    return y + 18
+        axes.axvline(scene.engaged_at_s - first, color=_ENGAGED, linewidth=1.0)
+    axes.tick_params(colors=canvas.INK, labelsize=8)
+    axes.xaxis.label.set_color(canvas.INK)
+    axes.yaxis.label.set_color(canvas.INK)
+    for side, spine in axes.spines.items():
+        spine.set(color=canvas.FAINT, visible=side in {'left', 'bottom'})
 
 
-def _draw_profile(panel: Image, at: Point, size: Point, scene: TrajectoryScene) -> None:
-    """Plot altitude over time."""
-    x, y = at
-    width, height = size
-    low, high = _altitude_range(scene)
-    first, last = scene.track[0].time_s, scene.track[-1].time_s
-    span = max(last - first, 1e-6)
-    cv2.line(panel, (x, y), (x, y + height), canvas.FAINT, 1)
-    cv2.line(panel, (x, y + height), (x + width, y + height), canvas.FAINT, 1)
-    times = np.array([point.time_s for point in scene.track])
-    altitudes = np.array([point.altitude_agl_m for point in scene.track])
-    us = (x + (times - first) / span * width).round().astype(int)
-    vs = (y + height - (altitudes - low) / (high - low) * height).round().astype(int)
-    colours = canvas.altitude_colours(altitudes, low, high)
-    for k in range(len(us) - 1):
-        shade = tuple(int(each) for each in colours[k])
-        cv2.line(panel, (us[k], vs[k]), (us[k + 1], vs[k + 1]), shade, 2, cv2.LINE_AA)
-    if scene.engaged_at_s is not None:
-        mark = x + round((scene.engaged_at_s - first) / span * width)
-        cv2.line(panel, (mark, y), (mark, y + height), (255, 120, 255), 1, cv2.LINE_AA)
-    canvas.put_text(panel, f'{high:.0f} m', (14, y + 10), scale=0.42)
-    canvas.put_text(panel, '0', (40, y + height), scale=0.42)
-    canvas.put_text(panel, '0 s', (x, y + height + 18), scale=0.42)
-    end = f'{span:.0f} s'
-    left = x + width - canvas.text_width(end, 0.42)
-    canvas.put_text(panel, end, (left, y + height + 18), scale=0.42)
-
-
-def _draw_inset(panel: Image, view: _View, scene: TrajectoryScene, top: int) -> None:
+def _draw_inset(axes: Axes, view: _View, scene: TrajectoryScene) -> None:
     """Show the whole world, small, with the frame of the map on it."""
-    height, width = scene.world_rgb.shape[:2]
-    room = min(_MAP_PX - top - 20, _PANEL_PX - 60)
-    if room < 60:
-        return
-    small = canvas.fitted(scene.world_rgb, room)
-    size = (small.shape[1], small.shape[0])
-    per_px = scene.gsd_m * max(height, width) / room
-
-    def at(east_m: float, north_m: float) -> Point:
-        return round(size[0] / 2 + east_m / per_px), round(size[1] / 2 - north_m / per_px)
-
-    half = view.span_m / 2
-    east, north = view.centre
-    corners = at(east - half, north + half), at(east + half, north - half)
-    cv2.rectangle(small, *corners, (0, 0, 0), 3)
-    cv2.rectangle(small, *corners, (255, 255, 255), 1)
-    panel[top : top + size[1], 30 : 30 + size[0]] = small
-    text = f'whole world, {width * scene.gsd_m:.0f} x {height * scene.gsd_m:.0f} m'
-    canvas.put_text(panel, text, (30, top - 8), scale=0.45, colour=canvas.FAINT)
+    east, north = scene.size_m
+    extent_m = (-east / 2, east / 2, -north / 2, north / 2)
+    step = max(1, max(scene.world_rgb.shape) // _MAP_PX)
+    axes.imshow(scene.world_rgb[::step, ::step], extent=extent_m)
+    frame = Rectangle(tuple(view.low_m), view.span_m, view.span_m, fill=False, edgecolor='white')
+    axes.add_patch(_outlined(frame))
+    axes.axis(extent_m)
+    text = f'whole world, {east:.0f} x {north:.0f} m'
+    axes.set_title(text, color=canvas.FAINT, fontsize=8.5, loc='left')

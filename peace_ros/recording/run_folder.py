@@ -1,13 +1,13 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The folder of a run's results: where the user stands, never over the results of another run."""
+"""The folder of a run's results, never over those of another run, and files that are whole."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
 
-from peace_ros.core.domain import ConfigurationError
+from peace_ros.core.domain import ConfigurationError, RecordingError
 
 RUNS = Path('runs')
 
@@ -23,7 +23,6 @@ def create_run_folder(chosen: Path | None, name: str, option: str) -> Path:
 
     Raises:
         ConfigurationError: it holds something already or cannot be created.
-
     """
     try:
         if chosen is None:
@@ -49,3 +48,20 @@ def _create_new(folder: Path) -> Path:
             return wanted
         number += 1
         wanted = folder.with_name(f'{folder.name}_{number}')
+
+
+def write_whole(path: Path, content: bytes | str, what: str) -> None:
+    """Write a file that appears under its name only when it is complete.
+
+    Raises:
+        RecordingError: the place cannot be written to; the message begins with ``what``.
+    """
+    partial = path.with_name(f'.{path.name}.partial')
+    try:
+        partial.write_bytes(content if isinstance(content, bytes) else content.encode())
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise RecordingError(
+            f'{what} {path} cannot be written ({error}): give a folder that is writable'
+        ) from error

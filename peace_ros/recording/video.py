@@ -45,7 +45,6 @@ class AltitudeProfile:
 
         Raises:
             RecordingError: anything else.
-
         """
         start, colon, end = text.partition(':')
         try:
@@ -73,7 +72,6 @@ class VideoReader:
 
         Raises:
             RecordingError: the file is missing or no video that OpenCV reads.
-
         """
         if not path.is_file():
             raise RecordingError(f'video {path} does not exist: give a video file')
@@ -95,7 +93,6 @@ class VideoReader:
 
         Raises:
             RecordingError: decoding breaks off in the middle.
-
         """
         capture = cv2.VideoCapture(str(self.path))
         try:
@@ -145,7 +142,6 @@ class VideoWriter:
 
         Raises:
             RecordingError: OpenCV has no encoder, or the size changed.
-
         """
         size = (image_rgb.shape[1], image_rgb.shape[0])
         if self._writer is None:

@@ -16,12 +16,12 @@ from peace_ros.recording import (
     SiteMark,
     TrackPoint,
     TrajectoryScene,
-    canvas,
     draw_filmstrip,
     draw_trajectory,
     save_picture,
 )
 from peace_ros.recording.contact_sheet import Cell, draw_contact_sheet
+from peace_ros.recording.pictures import nice_length_m
 
 GREY = 90
 
@@ -152,11 +152,4 @@ def test_pictures_are_saved_whole_or_not_at_all(tmp_path) -> None:
 
 
 def test_scale_bars_have_round_lengths() -> None:
-    assert [canvas.nice_length_m(m) for m in (0.7, 1.0, 4.9, 32.0, 99.0)] == [0.5, 1, 2, 20, 50]
-
-
-def test_text_breaks_into_lines_that_fit() -> None:
-    lines = canvas.wrap('a rendered image of grass in spring and fog', 120, 0.5)
-    assert len(lines) > 1
-    assert all(canvas.text_width(line, 0.5) <= 120 for line in lines)
-    assert ' '.join(lines) == 'a rendered image of grass in spring and fog'
+    assert [nice_length_m(m) for m in (0.7, 1.0, 4.9, 32.0, 99.0)] == [0.5, 1, 2, 20, 50]

@@ -19,7 +19,7 @@ from peace_ros.simulation.drawing import (
 from peace_ros.simulation.drawing.canvas import Canvas
 from peace_ros.simulation.drawing.light import Sun
 from peace_ros.simulation.drawing.palette import Palette
-from peace_ros.simulation.drawing.plan import Plan, Thing, Warp
+from peace_ros.simulation.drawing.plan import Building, Plan, Thing, Warp
 from peace_ros.simulation.drawing.scene import Look, render
 from peace_ros.simulation.drawing.sprites import stamp_thing
 from peace_ros.simulation.drawing.window import DrawnWindow
@@ -104,7 +104,7 @@ def test_every_season_draws_every_layout(season):
 @pytest.mark.parametrize('heading_rad', [0.0, 0.6])
 def test_a_car_covers_its_own_area_at_every_resolution(gsd_m, heading_rad):
     plan = lawn()
-    plan.thing('car', 0.4, -0.3, heading_rad, 4.5, 1.8, (200.0, 40.0, 40.0), Label.VEHICLE)
+    plan.put(Thing('car', 0.4, -0.3, heading_rad, 4.5, 1.8, (200.0, 40.0, 40.0), Label.VEHICLE))
     canvas = render(plan, window(16.0, gsd_m), 1, NOON, PLAIN)
     car = canvas.labels == Label.VEHICLE
     assert car.sum() * gsd_m**2 == pytest.approx(4.5 * 1.8, rel=0.12)
@@ -119,15 +119,17 @@ def test_a_car_covers_its_own_area_at_every_resolution(gsd_m, heading_rad):
 def test_a_person_is_half_a_metre_and_never_vanishes(gsd_m):
     plan = lawn()
     for k in range(8):
-        plan.thing(
-            'person',
-            -10.0 + 2.83 * k,
-            0.37 * k,
-            0.8 * k,
-            0.55,
-            0.55,
-            (30.0, 30.0, 60.0),
-            Label.PERSON,
+        plan.put(
+            Thing(
+                'person',
+                -10.0 + 2.83 * k,
+                0.37 * k,
+                0.8 * k,
+                0.55,
+                0.55,
+                (30.0, 30.0, 60.0),
+                Label.PERSON,
+            )
         )
     canvas = render(plan, window(30.0, gsd_m), 1, NOON, PLAIN)
     count, _ = cv2.connectedComponents((canvas.labels == Label.PERSON).astype(np.uint8))
@@ -140,14 +142,14 @@ def test_a_person_is_half_a_metre_and_never_vanishes(gsd_m):
 @pytest.mark.parametrize('roof', ['gable', 'hip', 'flat', 'metal', 'plain', 'saw'])
 def test_a_building_is_true_to_size_under_every_roof(gsd_m, roof):
     plan = lawn()
-    plan.building(1.0, 2.0, 14.0, 9.0, 0.5, 5.0, roof, (170.0, 100.0, 80.0), 3)
+    plan.put(Building(1.0, 2.0, 14.0, 9.0, 0.5, 5.0, roof, (170.0, 100.0, 80.0), 3))
     canvas = render(plan, window(40.0, gsd_m), 1, NOON, PLAIN)
     assert (canvas.labels == Label.BUILDING).sum() * gsd_m**2 == pytest.approx(126.0, rel=0.03)
 
 
 def test_a_pitched_roof_is_brighter_on_the_side_of_the_sun():
     plan = lawn()
-    plan.building(0.0, 0.0, 14.0, 9.0, 0.0, 5.0, 'gable', (150.0, 100.0, 80.0), 5)
+    plan.put(Building(0.0, 0.0, 14.0, 9.0, 0.0, 5.0, 'gable', (150.0, 100.0, 80.0), 5))
     sun = Sun(pi / 2, 0.7, 1.0)  # towards the bottom of the image
     canvas = render(plan, window(30.0, 0.2), 1, sun, PLAIN)
     lit = canvas.rgb[75:90, 60:90].mean()
@@ -157,7 +159,7 @@ def test_a_pitched_roof_is_brighter_on_the_side_of_the_sun():
 
 def test_shadows_fall_away_from_the_sun_as_long_as_the_sun_is_low():
     plan = lawn()
-    plan.building(0.0, 0.0, 10.0, 10.0, 0.0, 8.0, 'plain', (200.0, 200.0, 200.0), 3)
+    plan.put(Building(0.0, 0.0, 10.0, 10.0, 0.0, 8.0, 'plain', (200.0, 200.0, 200.0), 3))
     plain = render(plan, window(60.0, 0.2), 1, Sun(0.0, pi / 4, 0.0), PLAIN).rgb
     sunny = render(plan, window(60.0, 0.2), 1, Sun(0.0, pi / 4, 1.0), PLAIN).rgb
     dark = (sunny.mean(axis=2) < 0.75 * plain.mean(axis=2)) & (np.arange(300) < 120)[None, :]
@@ -169,7 +171,7 @@ def test_shadows_fall_away_from_the_sun_as_long_as_the_sun_is_low():
 
 def test_shadows_do_not_change_labels():
     plan = lawn()
-    plan.building(-6.0, 0.0, 10.0, 10.0, 0.2, 12.0, 'flat', (200.0, 200.0, 200.0), 3)
+    plan.put(Building(-6.0, 0.0, 10.0, 10.0, 0.2, 12.0, 'flat', (200.0, 200.0, 200.0), 3))
     plan.tree(8.0, 3.0, 7.0, 9.0, (60.0, 90.0, 50.0), 'leafy')
     labels = [
         render(plan, window(60.0, 0.25), 1, Sun(azimuth, elevation, clear), PLAIN).labels

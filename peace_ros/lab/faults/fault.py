@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.landing import State
+from peace_ros.lab.faults.walker import Walker
 from peace_ros.nodes.status import FAILED
 
 if TYPE_CHECKING:
@@ -27,16 +30,24 @@ ABSENT = ''
 """In place of a state: the landing node is silent."""
 
 
-class Injection(Protocol):
+@dataclass
+class Injection:
     """Something that goes wrong; the companion is not told."""
 
-    def begin(self, bench: FlightBench, /) -> None:
-        """Begin."""
-        ...
+    happens: Callable[[FlightBench], AbstractContextManager[Walker | None]]
+    """The fault is there while the context lasts; its value is a person who walks below."""
+    walker: Walker | None = None
+    """That person, once the fault has begun."""
+    _ending: ExitStack = field(default_factory=ExitStack)
 
-    def end(self, bench: FlightBench, /) -> None:
+    def begin(self, bench: FlightBench) -> None:
+        """Begin; what an earlier flight left open stays as it is."""
+        self._ending = ExitStack()
+        self.walker = self._ending.enter_context(self.happens(bench))
+
+    def end(self) -> None:
         """End it."""
-        ...
+        self._ending.close()
 
 
 @dataclass(frozen=True)

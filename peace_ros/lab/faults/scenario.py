@@ -81,8 +81,8 @@ class Scenario:
             self._inject()
             self._watch_fault()
         if self.fault.lead is not None:
-            self.fault.lead.end(self.bench)
-        self.fault.injection.end(self.bench)
+            self.fault.lead.end()
+        self.fault.injection.end()
         self.record.ended_s = time.monotonic() - self.injected_s
         self._watch_recovery()
 
@@ -160,7 +160,7 @@ class Scenario:
         aborted = record.first((State.ABORTED.value,))
         if aborted is not None:
             record.lost_control_s = aborted.at_s
-        walker = getattr(self.fault.injection, 'walker', None)
+        walker = self.fault.injection.walker
         self._judge_handovers(walker)
         if walker is not None:
             self._watch_person(walker)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from array import array
 from collections.abc import Callable, Iterable
+from itertools import cycle
 from typing import Any
 
 import cv2
@@ -52,47 +53,41 @@ def rare(period_s: float, clock_s: Callable[[], float] = time.monotonic) -> Tamp
     return tamper
 
 
+def edited(change: Callable[[Any], Any]) -> Tamper:
+    """Hand on what a function makes of each message."""
+    return lambda message: ((0.0, change(message)),)
+
+
 def frozen(*, new_stamps: bool) -> Tamper:
     """Repeat the first picture, with its old stamp or with the stamps of those that follow."""
     kept: list[Any] = []
 
-    def tamper(message: Any) -> Iterable[Late]:
-        if not kept:
-            kept.append(message)
-        first = kept[0]
-        at_ns = stamp_ns_of(message) if new_stamps else stamp_ns_of(first)
-        return ((0.0, _with(first, first.data, at_ns)),)
+    def change(message: Any) -> Any:
+        kept.append(message)
+        del kept[1:]
+        at_ns = stamp_ns_of(message if new_stamps else kept[0])
+        return _with(kept[0], kept[0].data, at_ns)
 
-    return tamper
+    return edited(change)
 
 
 def filled(level: int) -> Tamper:
     """Give every pixel one value."""
-
-    def tamper(message: Any) -> Iterable[Late]:
-        data = array('B', bytes([level]) * len(message.data))
-        return ((0.0, _with(message, data)),)
-
-    return tamper
+    return edited(lambda message: _with(message, array('B', [level]) * len(message.data)))
 
 
 def noisy(seed: int = 0) -> Tamper:
     """Give every pixel a random value."""
     random = np.random.default_rng(seed)
-
-    def tamper(message: Any) -> Iterable[Late]:
-        return ((0.0, _with(message, array('B', random.bytes(len(message.data))))),)
-
-    return tamper
+    return edited(lambda message: _with(message, array('B', random.bytes(len(message.data)))))
 
 
 def flickering() -> Tamper:
     """Turn every second picture into zeros and the others into the highest value."""
-    count = [0]
+    fills = cycle((filled(255), filled(0)))
 
     def tamper(message: Any) -> Iterable[Late]:
-        count[0] += 1
-        return filled(255 * (count[0] % 2))(message)
+        return next(fills)(message)
 
     return tamper
 
@@ -105,77 +100,76 @@ def cut_short(message: Any) -> Iterable[Late]:
 def of_encoding(encoding: str) -> Tamper:
     """Claim another encoding for the same bytes."""
 
-    def tamper(message: Any) -> Iterable[Late]:
+    def change(message: Any) -> Any:
         changed = _with(message, message.data)
         changed.encoding = encoding
-        return ((0.0, changed),)
+        return changed
 
-    return tamper
+    return edited(change)
 
 
 def resized(width_px: int, height_px: int) -> Tamper:
     """Cut a window of that shape out of the middle and scale it to that size."""
 
-    def tamper(message: Any) -> Iterable[Late]:
-        pixels = pixels_of(message)
+    def change(message: Any) -> Any:
         scale = min(message.width / width_px, message.height / height_px)
         width, height = round(width_px * scale), round(height_px * scale)
         left, top = (message.width - width) // 2, (message.height - height) // 2
-        window = np.ascontiguousarray(pixels[top : top + height, left : left + width])
+        window = np.ascontiguousarray(pixels_of(message)[top : top + height, left : left + width])
         small = np.asarray(cv2.resize(window, (width_px, height_px)), np.uint8)
-        header = message.header
-        return (
-            (0.0, image_message(small, message.encoding, stamp_ns_of(message), header.frame_id)),
-        )
+        return image_message(small, message.encoding, stamp_ns_of(message), message.header.frame_id)
 
-    return tamper
+    return edited(change)
+
+
+def restamped(stamp: Callable[[int, int], int]) -> Tamper:
+    """Give every picture the stamp (ns) that a function makes of the first stamp and its own."""
+    first_ns: list[int] = []
+
+    def change(message: Any) -> Any:
+        first_ns.append(stamp_ns_of(message))
+        return _with(message, message.data, stamp(first_ns[0], first_ns[-1]))
+
+    return edited(change)
 
 
 def shifted(seconds: float) -> Tamper:
     """Move the stamps."""
-    shift_ns = round(seconds * NANOSECONDS)
-
-    def tamper(message: Any) -> Iterable[Late]:
-        at_ns = max(0, stamp_ns_of(message) + shift_ns)
-        return ((0.0, _with(message, message.data, at_ns)),)
-
-    return tamper
+    return restamped(lambda _, own_ns: max(0, own_ns + round(seconds * NANOSECONDS)))
 
 
 def equal_stamps() -> Tamper:
     """Give every picture the stamp of the first."""
-    first_ns: list[int] = []
-
-    def tamper(message: Any) -> Iterable[Late]:
-        first_ns.append(stamp_ns_of(message))
-        return ((0.0, _with(message, message.data, first_ns[0])),)
-
-    return tamper
+    return restamped(lambda first_ns, _: first_ns)
 
 
 def running_back() -> Tamper:
     """Let the stamps run backwards from the first on, as fast as time runs forward."""
-    first_ns: list[int] = []
+    return restamped(lambda first_ns, own_ns: 2 * first_ns - own_ns)
 
-    def tamper(message: Any) -> Iterable[Late]:
-        first_ns.append(stamp_ns_of(message))
-        return ((0.0, _with(message, message.data, 2 * first_ns[0] - first_ns[-1])),)
 
-    return tamper
+def _where_posed(
+    pose_at: Callable[[int], Pose | None], change: Callable[[Any, Pose, int], NDArray[np.uint8]]
+) -> Tamper:
+    """Hand on the pixels that a function makes of a message, where the true pose is known."""
+
+    def with_pose(message: Any) -> Any:
+        at_ns = stamp_ns_of(message)
+        pose = pose_at(at_ns)
+        if pose is None:
+            return message
+        pixels, frame_id = change(message, pose, at_ns), message.header.frame_id
+        return image_message(pixels, 'mono8' if pixels.ndim == 2 else 'rgb8', at_ns, frame_id)
+
+    return edited(with_pose)
 
 
 def with_walker(walker: Walker, camera: Camera, pose_at: Callable[[int], Pose | None]) -> Tamper:
     """Paint a person who walks over the ground into the camera's picture."""
-
-    def tamper(message: Any) -> Iterable[Late]:
-        at_ns = stamp_ns_of(message)
-        pose = pose_at(at_ns)
-        if pose is None:
-            return ((0.0, message),)
-        painted = walker.paint(pixels_of(message), camera, pose, at_ns)
-        return ((0.0, image_message(painted, 'rgb8', at_ns, message.header.frame_id)),)
-
-    return tamper
+    return _where_posed(
+        pose_at,
+        lambda message, pose, at_ns: walker.paint(pixels_of(message), camera, pose, at_ns),
+    )
 
 
 def with_walker_seen(
@@ -183,16 +177,12 @@ def with_walker_seen(
 ) -> Tamper:
     """Let the heatmap call the ground around a walking person unsafe, as a good model would."""
 
-    def tamper(message: Any) -> Iterable[Late]:
-        at_ns = stamp_ns_of(message)
-        pose = pose_at(at_ns)
-        if pose is None:
-            return ((0.0, message),)
+    def darken(message: Any, pose: Pose, at_ns: int) -> NDArray[np.uint8]:
         levels = pixels_of(message)[:, :, 0]
         walker.darken(levels, camera.resized(message.width, message.height), pose, at_ns)
-        return ((0.0, image_message(levels, 'mono8', at_ns, message.header.frame_id)),)
+        return levels
 
-    return tamper
+    return _where_posed(pose_at, darken)
 
 
 def without_term(message: Any) -> Iterable[Late]:

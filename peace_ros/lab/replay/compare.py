@@ -70,7 +70,6 @@ class Reference:
 
         Raises:
             RecordingError: the files are missing or do not belong together.
-
         """
         try:
             content: dict[str, Any] = json.loads(stem.with_suffix('.json').read_text())

@@ -24,7 +24,6 @@ def replay_in_terminal(options: ReplayOptions, console: Console) -> ReplayReport
 
     Raises:
         PeaceError: as :func:`peace_ros.lab.replay.replay` does.
-
     """
     columns = (
         TextColumn('{task.description}'),

@@ -59,7 +59,6 @@ class ReplayLine:
 
         Raises:
             PeaceError: parameters, terms, vocabularies or bundles cannot be used.
-
         """
         self.pipeline = Pipeline.from_preset(preset, threads=threads)
         self.landing = create_landing(preset, camera)
@@ -75,7 +74,6 @@ class ReplayLine:
 
         Raises:
             PeaceError: there is no heatmap of this frame, nor would there be in flight.
-
         """
         look = self.pipeline.look(frame)
         self._feed_poses(frame.stamp_ns)

@@ -8,10 +8,12 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import cv2
+
 from peace_ros.core.landing.pairs import decision_pairs
 from peace_ros.core.prompting.pairs import prompt_pairs
 from peace_ros.core.segmentation import draw_overlay
-from peace_ros.recording import BagWriter, VideoWriter, canvas, save_picture
+from peace_ros.recording import BagWriter, VideoWriter, save_picture
 from peace_ros.recording.contact_sheet import Cell, draw_contact_sheet
 from peace_ros.recording.messages import diagnostic_array, heatmap_to_image, jpeg_message
 
@@ -41,7 +43,6 @@ class ReplayOutputs:
             frames: about how many frames will come, to spread the contact sheet over them.
             video_hz: frame rate of the overlay video; None writes none.
             title: of the contact sheet.
-
         """
         self._folder = folder
         self._every = max(1, frames // _CELLS)
@@ -106,5 +107,7 @@ def _caption(step: Step | None) -> str:
 
 def _captioned(image: NDArray[np.uint8], caption: str) -> NDArray[np.uint8]:
     picture: NDArray[np.uint8] = image.copy()
-    canvas.put_text(picture, caption, (8, 20), scale=0.5, outline=True)
+    for colour, thickness in ((0, 0, 0), 3), ((235, 235, 235), 1):
+        at, font = (8, 20), cv2.FONT_HERSHEY_SIMPLEX
+        cv2.putText(picture, caption, at, font, 0.5, colour, thickness, cv2.LINE_AA)
     return picture

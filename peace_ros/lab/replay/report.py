@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from peace_ros.core.domain import RecordingError
+from peace_ros.recording.run_folder import write_whole
 
 if TYPE_CHECKING:
     from peace_ros.core.pipeline import SegmentedFrame
@@ -67,7 +67,6 @@ class ReplayReport:
 
         Raises:
             RecordingError: the place cannot be written to.
-
         """
         content = {
             **asdict(self),
@@ -77,14 +76,7 @@ class ReplayReport:
             'mean_safe_fraction': round(self.mean_safe_fraction, 4),
             'was_engaged': self.was_engaged,
         }
-        partial = path.with_name(f'.{path.name}.partial')
-        try:
-            partial.write_text(json.dumps(content, indent=2) + '\n', encoding='utf-8')
-            partial.replace(path)
-        except OSError as error:
-            raise RecordingError(
-                f'summary {path} cannot be written ({error}): give a folder that is writable'
-            ) from error
+        write_whole(path, json.dumps(content, indent=2) + '\n', 'summary')
 
 
 class ReportBuilder:

@@ -50,7 +50,6 @@ class ReplayOptions:
 
         Raises:
             ConfigurationError: it holds something already or cannot be created.
-
         """
         return create_run_folder(self.out, f'{self.source.resolve().stem}_replay', '--out')
 
@@ -61,7 +60,6 @@ def replay(options: ReplayOptions, progress: Progress | None = None) -> tuple[Re
     Raises:
         PeaceError: source, configuration, models or output folder cannot be used, or no frame
             of the recording can.
-
     """
     source = open_source(options.source, options.part)
     replayer = Replayer(source, options.config)
@@ -109,7 +107,6 @@ class Replayer:
 
         Raises:
             PeaceError: models or parameters cannot be used, or the recording breaks off.
-
         """
         began = time.monotonic()
         frames = self._source.frames()

@@ -8,7 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import radians
 from pathlib import Path
-from typing import Protocol
+from typing import Annotated, Protocol
+
+from typer import Option
 
 from peace_ros.core.domain import Frame, ImageError, Pose, RecordingError, VehicleError
 from peace_ros.core.messages import (
@@ -33,20 +35,32 @@ _PREFERRED_POSES = ('/ground_truth/pose', '/pose')
 class SourceOptions:
     """Which part of a recording is replayed, and what it does not say itself."""
 
-    image_topic: str | None = None
-    """None takes the only image topic, or ``/image``."""
-    pose_topic: str | None = None
-    """None takes the only pose topic, or ``/ground_truth/pose``."""
-    fov_x_deg: float | None = None
-    """Full horizontal field of view; None takes it from camera_info, otherwise 73."""
-    altitude: str = DEFAULT_ALTITUDE
-    """``START:END`` metres, for videos."""
-    every: int = 1
-    """Take every n-th frame."""
-    hz: float | None = None
-    """Take at most this many frames per second of the recording."""
-    limit: int | None = None
-    """Stop after this many frames."""
+    image_topic: Annotated[
+        str | None, Option(help='Image or CompressedImage; default: the only one, or /image.')
+    ] = None
+    pose_topic: Annotated[
+        str | None,
+        Option(
+            help='PoseStamped, PoseWithCovarianceStamped or Odometry, in ENU; default: the only '
+            'one, or /ground_truth/pose.'
+        ),
+    ] = None
+    fov_x_deg: Annotated[
+        float | None,
+        Option(
+            '--fov',
+            metavar='DEG',
+            help='Full horizontal field of view; default camera_info, else 73.',
+        ),
+    ] = None
+    altitude: Annotated[
+        str, Option(metavar='START:END', help='Metres, linear over the file; for videos.')
+    ] = DEFAULT_ALTITUDE
+    every: Annotated[int, Option(metavar='N', help='Take every N-th frame.')] = 1
+    hz: Annotated[
+        float | None, Option(metavar='HZ', help='Take at most HZ frames per recorded second.')
+    ] = None
+    limit: Annotated[int | None, Option(metavar='N', help='Stop after N frames.')] = None
 
     def __post_init__(self) -> None:
         if self.every < 1:
@@ -187,7 +201,6 @@ def open_source(path: Path, options: SourceOptions) -> RecordingSource:
 
     Raises:
         RecordingError: neither, or the topics that are needed are not in it.
-
     """
     if not path.exists():
         raise RecordingError(f'{path} does not exist: give a bag or a video file')

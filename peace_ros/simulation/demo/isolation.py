@@ -29,7 +29,6 @@ def isolate(log_dir: Path) -> int:
 
     Raises:
         ConfigurationError: every domain that a demo may take is in use.
-
     """
     domain = _free_domain()
     os.environ['ROS_DOMAIN_ID'] = str(domain)

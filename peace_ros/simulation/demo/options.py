@@ -8,6 +8,9 @@ import socket
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
+from typing import Annotated
+
+from typer import Option
 
 from peace_ros.core.domain import Camera, ConfigurationError, VehicleError
 from peace_ros.core.node_parameters import CameraOptions
@@ -25,33 +28,59 @@ _NETWORK_KINDS = ('udp', 'udpin', 'udpout', 'udpbcast', 'tcp', 'tcpin')
 class DemoOptions:
     """The options of ``peace demo``."""
 
-    world: Path | None = None
-    """Orthophoto; None draws a world from the seed."""
-    gsd_m: float | None = None
-    """Metres per pixel of the orthophoto."""
-    labels: Path | None = None
-    """Label raster of the orthophoto."""
-    start: tuple[float, float] | None = None
-    """Local origin of the vehicle, metres east and north of the centre of the world."""
-    config: str = 'peace_cs'
-    speed: float | None = None
-    """Simulated seconds per second; None chooses by what the machine can do."""
-    seed: int = 1
-    autopilot: str | None = None
-    """Which one our own simulation plays; None: ArduPilot."""
-    mavlink: str | None = None
-    """URL of an autopilot that is already there."""
-    pose_mavlink: str | None = None
-    """URL on which the camera hears the pose of that autopilot."""
-    camera_px: int = CameraOptions().camera_width
-    """Width and height of the camera's image."""
-    run_dir: Path | None = None
-    """Folder of the results; None: ``runs/<time>-seed<seed>`` where the user stands."""
-    timeout_s: float = DEFAULT_TIMEOUT_S
+    world: Annotated[
+        Path | None, Option(help='Orthophoto (JPEG, PNG, GeoTIFF); without it a world is drawn.')
+    ] = None
+    gsd_m: Annotated[
+        float | None, Option('--gsd', metavar='M', help='Metres of ground per pixel of --world.')
+    ] = None
+    labels: Annotated[
+        Path | None,
+        Option(help='Label raster of --world; <name>_label.png beside it is found without this.'),
+    ] = None
+    start: Annotated[
+        str | None,
+        Option(
+            metavar='X,Y', help='Start, metres east and north of the centre; default by --seed.'
+        ),
+    ] = None
+    config: Annotated[
+        str, Option(metavar='PRESET', help='Preset: dd_cs, d_cs, peace_cs, or a file.')
+    ] = 'peace_cs'
+    speed: Annotated[
+        float | None,
+        Option(help='Simulated seconds per second; default: 2 if this machine keeps up.'),
+    ] = None
+    seed: Annotated[int, Option(help='Seed of the drawn world and of the start.')] = 1
+    autopilot: Annotated[
+        str | None, Option(metavar='KIND', help='What is simulated: ardupilot (default) or px4.')
+    ] = None
+    mavlink: Annotated[
+        str | None, Option(metavar='URL', help='An autopilot that already runs.')
+    ] = None
+    pose_mavlink: Annotated[
+        str | None,
+        Option(metavar='URL', help='A second connection to it, which the camera follows.'),
+    ] = None
+    camera_px: Annotated[
+        int,
+        Option(
+            metavar='N',
+            help='Side of the image; from 704 on it is also seen closer, in parts; takes time.',
+        ),
+    ] = CameraOptions().camera_width
+    run_dir: Annotated[
+        Path | None,
+        Option(metavar='DIR', help='Empty or new folder; default runs/<time>-seed<seed>.'),
+    ] = None
+    timeout_s: Annotated[
+        float, Option('--timeout', metavar='S', help='Seconds that the landing may take.')
+    ] = DEFAULT_TIMEOUT_S
     """Wall clock, from the engagement."""
 
     def __post_init__(self) -> None:
         self._check_world()
+        _ = self.start_m
         self._check_vehicle()
         if self.speed is not None and not _SPEED_LIMITS[0] <= self.speed <= _SPEED_LIMITS[1]:
             raise ConfigurationError(
@@ -63,6 +92,11 @@ class DemoOptions:
             raise ConfigurationError(f'--camera-px {self.camera_px}: give 64 to 4096')
         if not 0 <= self.seed < 2**31:
             raise ConfigurationError(f'--seed {self.seed}: give 0 to {2**31 - 1}')
+
+    @property
+    def start_m(self) -> tuple[float, float] | None:
+        """Local origin of the vehicle, metres east and north of the centre of the world."""
+        return None if self.start is None else parse_start(self.start)
 
     def _check_world(self) -> None:
         if self.world is None:
@@ -135,7 +169,6 @@ class DemoOptions:
 
         Raises:
             ConfigurationError: it holds something already or cannot be created.
-
         """
         now = datetime.now(timezone.utc).strftime('%Y%m%d-%H%M%S')
         return create_run_folder(self.run_dir, f'{now}-seed{self.seed}', '--run-dir')
@@ -146,7 +179,6 @@ def parse_start(text: str) -> tuple[float, float]:
 
     Raises:
         ConfigurationError: anything else.
-
     """
     parts = text.split(',')
     try:
@@ -185,7 +217,6 @@ def refuse_to_arm_elsewhere(url: str) -> None:
 
     Raises:
         VehicleError: the URL does not stay on this machine.
-
     """
     if not is_on_this_machine(url):
         raise VehicleError(

@@ -45,7 +45,6 @@ class VehicleLine:
 
         Raises:
             VehicleError: not within the limit, and why.
-
         """
         deadline = time.monotonic() + self._limit_s
         while self._link is None and not self._left:
@@ -69,7 +68,6 @@ class VehicleLine:
 
         Raises:
             VehicleError: it does not get there, or may be a real one and is not in the air.
-
         """
         link = self._link
         if link is None:

@@ -64,7 +64,6 @@ class ProcessGroup:
 
         Raises:
             ProcessError: the log or the process cannot be created.
-
         """
         log = self._log_dir / f'{name}.log'
         command = [
@@ -97,7 +96,6 @@ class ProcessGroup:
 
         Raises:
             ProcessError: one has ended; the sentence holds its exit status and last log lines.
-
         """
         for each in self._running:
             status = each.process.poll()

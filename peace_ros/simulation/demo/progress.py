@@ -67,7 +67,6 @@ class Progress:
             console: where to show.
             take: returns the newest snapshot; called from another thread.
             title: of the panel.
-
         """
         self._console = console
         self._take = take

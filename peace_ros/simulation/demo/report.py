@@ -42,7 +42,6 @@ def draw_pictures(
 
     Raises:
         RecordingError: the run folder cannot be written to.
-
     """
     written = []
     if history.poses:

@@ -94,7 +94,6 @@ def run_demo(options: DemoOptions, console: Console) -> int:
 
     Raises:
         PeaceError: what was asked for cannot be started at all.
-
     """
     preset = load_preset(options.config)
     landing = preset.fill('landing', LandingParameters)

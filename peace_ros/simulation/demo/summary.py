@@ -10,7 +10,8 @@ from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from peace_ros.core.domain import Pose, RecordingError
+from peace_ros.core.domain import Pose
+from peace_ros.recording.run_folder import write_whole
 from peace_ros.simulation.camera import NadirCamera
 from peace_ros.simulation.demo.truth import NO_TRUTH, GroundVerdict, judge
 
@@ -102,16 +103,8 @@ class Summary:
 
         Raises:
             RecordingError: the place cannot be written to.
-
         """
-        partial = path.with_name(f'.{path.name}.partial')
-        try:
-            partial.write_text(self.as_json(), encoding='utf-8')
-            partial.replace(path)
-        except OSError as error:
-            raise RecordingError(
-                f'summary {path} cannot be written ({error}): give a folder that is writable'
-            ) from error
+        write_whole(path, self.as_json(), 'summary')
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,6 @@ def prepare_world(options: DemoOptions, run_dir: Path) -> DemoWorld:
     Raises:
         WorldError: an image or label raster cannot be used.
         RecordingError: the run folder cannot be written to.
-
     """
     label_file: Path | None
     if options.world is None:
@@ -58,7 +57,7 @@ def prepare_world(options: DemoOptions, run_dir: Path) -> DemoWorld:
         note += 'without ground truth' if label_file is None else f'labels {label_file.name}'
         if label_file is not None and options.labels is None:
             note += ' (found beside it)'
-    east_m, north_m = options.start or _drawn_start(world, options.seed)
+    east_m, north_m = options.start_m or _drawn_start(world, options.seed)
     placed = replace(world, centre_east_m=-east_m, centre_north_m=-north_m)
     return DemoWorld(placed, image_file, label_file, east_m, north_m, note)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from peace_ros.simulation.drawing.furnish import Block, Furnisher
 from peace_ros.simulation.drawing.palette import jitter
+from peace_ros.simulation.drawing.plan import Building
 
 
 def houses(f: Furnisher, block: Block) -> None:
@@ -134,17 +135,12 @@ def city(f: Furnisher, block: Block) -> None:
                 wide = end - at
             if rng.random() < 0.9:
                 mid = at + 0.5 * wide
-                x = (
-                    block.x0 + mid
-                    if horizontal
-                    else (block.x0 + deep / 2 if side == 1 else block.x1 - deep / 2)
-                )
-                y = (
-                    (block.y0 + deep / 2 if side == 0 else block.y1 - deep / 2)
-                    if horizontal
-                    else (block.y0 + mid)
-                )
-                _city_house(f, x, y, wide, deep, 0.0 if horizontal else pi / 2, style)
+                if horizontal:
+                    y = block.y0 + deep / 2 if side == 0 else block.y1 - deep / 2
+                    _city_house(f, block.x0 + mid, y, wide, deep, 0.0, style)
+                else:
+                    x = block.x0 + deep / 2 if side == 1 else block.x1 - deep / 2
+                    _city_house(f, x, block.y0 + mid, wide, deep, pi / 2, style)
             at += wide
     yard_block = block.inset(deep + 1.5)
     if min(yard_block.width_m, yard_block.depth_m) > 6.0:
@@ -170,7 +166,8 @@ def _city_house(
     else:
         roof = 'flat'
         rgb = f.palette.roof('flat_pale' if rng.random() < 0.55 else 'flat_dark')
-    f.plan.building(x, y, length, width, heading, eaves, roof, rgb, int(rng.integers(2**31)))
+    seed = int(rng.integers(2**31))
+    f.plan.put(Building(x, y, length, width, heading, eaves, roof, rgb, seed))
 
 
 def square(f: Furnisher, block: Block) -> None:
@@ -255,7 +252,8 @@ def industry(f: Furnisher, block: Block) -> None:
     x, y = inner.x0 + size_x / 2, inner.y1 - size_y / 2
     eaves, rgb = float(rng.uniform(6.0, 11.0)), f.palette.roof(style)
     seed = int(rng.integers(2**31))
-    f.plan.building(x, y, max(size_x, 6.0), max(size_y, 6.0), 0.0, eaves, roof, rgb, seed)
+    sizes = max(size_x, 6.0), max(size_y, 6.0)
+    f.plan.put(Building(x, y, *sizes, 0.0, eaves, roof, rgb, seed))
     yard = (
         Block(inner.x0 + size_x + 3, inner.y0, inner.x1, inner.y1)
         if along_x
@@ -278,13 +276,8 @@ def industry(f: Furnisher, block: Block) -> None:
 
 
 _CONTAINERS = (
-    (168, 66, 48),
-    (52, 84, 132),
-    (70, 108, 84),
-    (196, 196, 192),
-    (206, 140, 52),
-    (92, 92, 98),
-)
+    (168, 66, 48), (52, 84, 132), (70, 108, 84), (196, 196, 192), (206, 140, 52), (92, 92, 98),
+)  # fmt: skip
 
 
 def farmyard(f: Furnisher, block: Block) -> None:

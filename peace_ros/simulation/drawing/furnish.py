@@ -11,7 +11,7 @@ import numpy as np
 
 from peace_ros.core.domain import Label
 from peace_ros.simulation.drawing.palette import Material, Palette, Rgb, jitter
-from peace_ros.simulation.drawing.plan import Plan
+from peace_ros.simulation.drawing.plan import Building, Plan, Thing
 from peace_ros.simulation.drawing.sprites import label_of
 
 _CAR_SPRITES = ('car', 'saloon', 'estate', 'car', 'van')
@@ -144,7 +144,7 @@ class Furnisher:
             rgb = (224.0, 226.0, 228.0)
         flip = pi if rng.random() < 0.5 else 0.0
         heading = heading_rad + flip + float(rng.normal(0.0, 0.02))
-        self.plan.thing(name, x, y, heading, float(length), float(width), rgb, Label.VEHICLE)
+        self.plan.put(Thing(name, x, y, heading, float(length), float(width), rgb, Label.VEHICLE))
 
     def person(self, x: float, y: float) -> None:
         """Put a person who stands or walks."""
@@ -152,7 +152,7 @@ class Furnisher:
         sprite = 'person' if rng.random() < 0.5 else 'walker'
         size = float(rng.uniform(0.48, 0.6))
         heading = float(rng.uniform(0, 2 * pi))
-        self.plan.thing(sprite, x, y, heading, size, size, self.palette.cloth(), Label.PERSON)
+        self.plan.put(Thing(sprite, x, y, heading, size, size, self.palette.cloth(), Label.PERSON))
 
     def people(self, block: Block, per_hectare: float) -> None:
         """Scatter people, alone and in groups."""
@@ -176,7 +176,7 @@ class Furnisher:
     ) -> None:
         """Put an obstacle."""
         heading = float(self.rng.uniform(0, 2 * pi)) if heading_rad is None else heading_rad
-        self.plan.thing(sprite, x, y, heading, length_m, width_m, rgb, label_of(sprite))
+        self.plan.put(Thing(sprite, x, y, heading, length_m, width_m, rgb, label_of(sprite)))
 
     def garden_furniture(self, x: float, y: float) -> None:
         """Put a table, a parasol, a trampoline or a crate."""
@@ -231,10 +231,9 @@ class Furnisher:
             du, dv = side * 0.25 * length_m, 0.5 * width_m
             wx = x + du * cos(heading_rad) - dv * sin(heading_rad)
             wy = y + du * sin(heading_rad) + dv * cos(heading_rad)
-            plan.building(
-                wx, wy, wing * 1.4, wing, heading_rad + pi / 2, eaves * 0.9, roof, rgb, seed
-            )
-        plan.building(x, y, length_m, width_m, heading_rad, eaves, roof, rgb, seed)
+            turned, low = heading_rad + pi / 2, eaves * 0.9
+            plan.put(Building(wx, wy, wing * 1.4, wing, turned, low, roof, rgb, seed))
+        plan.put(Building(x, y, length_m, width_m, heading_rad, eaves, roof, rgb, seed))
 
     def hall(
         self,
@@ -253,7 +252,7 @@ class Furnisher:
         )
         rgb = self.palette.roof(style) if rgb is None else rgb
         seed = int(self.rng.integers(2**31))
-        self.plan.building(*at, length, width, heading_rad, eaves, roof, rgb, seed)
+        self.plan.put(Building(*at, length, width, heading_rad, eaves, roof, rgb, seed))
 
     def shed(self, x: float, y: float, heading_rad: float) -> None:
         """Build a garden shed or garage."""
@@ -262,4 +261,4 @@ class Furnisher:
         roof = 'gable' if style == 'tiles' else 'plain'
         length, width = float(rng.uniform(2.2, 6.0)), float(rng.uniform(1.8, 3.2))
         rgb, seed = self.palette.roof(style), int(rng.integers(2**31))
-        self.plan.building(x, y, length, width, heading_rad, 2.2, roof, rgb, seed)
+        self.plan.put(Building(x, y, length, width, heading_rad, 2.2, roof, rgb, seed))

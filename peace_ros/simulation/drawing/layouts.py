@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
@@ -18,21 +18,13 @@ from peace_ros.simulation.drawing.plan import Plan, Warp
 from peace_ros.simulation.drawing.river import add_river
 
 _FILLERS: dict[str, Callable[[Furnisher, Block], None]] = {
-    'houses': blocks.houses,
-    'city': blocks.city,
-    'square': blocks.square,
-    'parking': blocks.parking,
-    'industry': blocks.industry,
-    'farmyard': blocks.farmyard,
-    'field': open_ground.field,
-    'meadow': open_ground.meadow,
-    'park': open_ground.park,
-    'sports': open_ground.sports,
-    'wood': open_ground.wood,
-    'allotments': open_ground.allotments,
-    'works': open_ground.works,
-    'desert': open_ground.desert,
-    'lake': open_ground.lake,
+    each.__name__: each
+    for each in (
+        *(blocks.houses, blocks.city, blocks.square, blocks.parking, blocks.industry),
+        *(blocks.farmyard, open_ground.field, open_ground.meadow, open_ground.park),
+        *(open_ground.sports, open_ground.wood, open_ground.allotments, open_ground.works),
+        *(open_ground.desert, open_ground.lake),
+    )
 }
 
 
@@ -51,103 +43,41 @@ class _Layout:
 
 _LAYOUTS: dict[str, _Layout] = {
     'suburb': _Layout(
-        {
-            'houses': 6,
-            'park': 1.6,
-            'sports': 0.6,
-            'parking': 0.5,
-            'square': 0.3,
-            'meadow': 0.8,
-            'allotments': 0.7,
-        },
-        (46, 95),
-        (5.5, 8.0),
-        ('asphalt', 'old_asphalt', 'new_asphalt'),
-        1.8,
-        2.5,
-        3.0,
+        {'houses': 6, 'park': 1.6, 'sports': 0.6, 'parking': 0.5, 'square': 0.3, 'meadow': 0.8,
+         'allotments': 0.7},
+        (46, 95), (5.5, 8.0), ('asphalt', 'old_asphalt', 'new_asphalt'), 1.8, 2.5, 3.0,
     ),
     'city': _Layout(
         {'city': 5, 'square': 1.6, 'park': 1.6, 'parking': 0.8, 'works': 0.7, 'sports': 0.5},
-        (45, 85),
-        (8.0, 15.0),
-        ('asphalt', 'new_asphalt'),
-        3.2,
-        7.0,
-        12.0,
+        (45, 85), (8.0, 15.0), ('asphalt', 'new_asphalt'), 3.2, 7.0, 12.0,
     ),
     'farmland': _Layout(
         {'field': 6, 'meadow': 2.5, 'wood': 0.9, 'farmyard': 1.1, 'lake': 0.4},
-        (70, 160),
-        (2.6, 5.0),
-        ('track', 'track', 'gravel', 'old_asphalt'),
-        0.0,
-        0.8,
-        0.8,
+        (70, 160), (2.6, 5.0), ('track', 'track', 'gravel', 'old_asphalt'), 0.0, 0.8, 0.8,
     ),
     'park': _Layout(
-        {
-            'park': 5,
-            'sports': 1.4,
-            'wood': 0.9,
-            'lake': 0.9,
-            'square': 0.5,
-            'meadow': 1.0,
-            'parking': 0.4,
-        },
-        (60, 120),
-        (3.0, 6.0),
-        ('gravel', 'asphalt', 'paving', 'old_asphalt'),
-        0.6,
-        1.0,
-        6.0,
+        {'park': 5, 'sports': 1.4, 'wood': 0.9, 'lake': 0.9, 'square': 0.5, 'meadow': 1.0,
+         'parking': 0.4},
+        (60, 120), (3.0, 6.0), ('gravel', 'asphalt', 'paving', 'old_asphalt'), 0.6, 1.0, 6.0,
     ),
     'industrial': _Layout(
         {'industry': 5, 'parking': 1.6, 'works': 1.0, 'meadow': 1.2, 'sports': 0.3},
-        (55, 110),
-        (8.0, 13.0),
-        ('asphalt', 'old_asphalt', 'concrete'),
-        1.2,
-        4.0,
-        2.0,
+        (55, 110), (8.0, 13.0), ('asphalt', 'old_asphalt', 'concrete'), 1.2, 4.0, 2.0,
     ),
     'riverside': _Layout(
         {'park': 2.5, 'city': 1.4, 'houses': 1.3, 'meadow': 1.5, 'square': 0.8, 'parking': 0.5},
-        (50, 95),
-        (6.0, 10.0),
-        ('asphalt', 'old_asphalt'),
-        2.0,
-        4.0,
-        6.0,
+        (50, 95), (6.0, 10.0), ('asphalt', 'old_asphalt'), 2.0, 4.0, 6.0,
     ),
     'desert': _Layout(
         {'desert': 5, 'works': 3.0, 'industry': 0.4, 'square': 0.2},
-        (70, 140),
-        (4.0, 9.0),
-        ('track', 'gravel', 'new_asphalt'),
-        0.0,
-        1.5,
-        1.5,
+        (70, 140), (4.0, 9.0), ('track', 'gravel', 'new_asphalt'), 0.0, 1.5, 1.5,
     ),
     'village': _Layout(
-        {
-            'houses': 3.2,
-            'farmyard': 1.2,
-            'meadow': 2.0,
-            'allotments': 1.1,
-            'field': 1.2,
-            'wood': 0.4,
-            'square': 0.4,
-            'sports': 0.3,
-        },
-        (50, 100),
-        (4.0, 6.0),
-        ('asphalt', 'old_asphalt', 'gravel'),
-        0.8,
-        1.4,
-        2.2,
+        {'houses': 3.2, 'farmyard': 1.2, 'meadow': 2.0, 'allotments': 1.1, 'field': 1.2,
+         'wood': 0.4, 'square': 0.4, 'sports': 0.3},
+        (50, 100), (4.0, 6.0), ('asphalt', 'old_asphalt', 'gravel'), 0.8, 1.4, 2.2,
     ),
-}
+}  # fmt: skip
 
 _Along = Callable[[float, float], tuple[float, float]]
 
@@ -167,13 +97,7 @@ def plan_layout(rng: np.random.Generator, layout: str, season: str, extent_m: fl
     )
     area = Block(shift[0] - half, shift[1] - half, shift[0] + half, shift[1] + half)
     middle = warp.points(np.array([area.middle]))[0]
-    warp = Warp(
-        warp.angle_rad,
-        warp.bend_m,
-        warp.wavelength_m,
-        warp.phase_rad,
-        (-float(middle[0]), -float(middle[1])),
-    )
+    warp = replace(warp, shift_m=(-float(middle[0]), -float(middle[1])))
     palette = Palette(rng, season)
     style = _LAYOUTS[layout]
     plan = Plan(warp, palette.material(style.surfaces[0]))
@@ -340,12 +264,8 @@ def _walkers(f: Furnisher, block: Block, style: _Layout) -> None:
         inward = float(rng.uniform(0.2, max(walk - 0.2, 0.3)))
         x, y = f.point(block)
         side = int(rng.integers(4))
-        if side == 0:
-            y = block.y0 + inward
-        elif side == 1:
-            y = block.y1 - inward
-        elif side == 2:
-            x = block.x0 + inward
+        if side < 2:
+            y = block.y0 + inward if side == 0 else block.y1 - inward
         else:
-            x = block.x1 - inward
+            x = block.x0 + inward if side == 2 else block.x1 - inward
         f.person(x, y)

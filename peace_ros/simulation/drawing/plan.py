@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import atan2, cos, hypot, pi, sin
 
@@ -84,7 +84,6 @@ class Barrier:
     width_m: float
     height_m: float
     rgb: Rgb
-    label: Label
 
 
 @dataclass(frozen=True)
@@ -104,13 +103,8 @@ class Warp:
         bent_x = x + a * np.sin(2 * pi * y / self.wavelength_m[0] + self.phase_rad[0])
         bent_y = y + b * np.sin(2 * pi * x / self.wavelength_m[1] + self.phase_rad[1])
         c, s = cos(self.angle_rad), sin(self.angle_rad)
-        return np.stack(
-            [
-                c * bent_x - s * bent_y + self.shift_m[0],
-                s * bent_x + c * bent_y + self.shift_m[1],
-            ],
-            axis=1,
-        )
+        east, south = self.shift_m
+        return np.stack([c * bent_x - s * bent_y + east, s * bent_x + c * bent_y + south], axis=1)
 
     def place(self, x_m: float, y_m: float, heading_rad: float) -> tuple[float, float, float]:
         """Map a position with a heading."""
@@ -123,10 +117,8 @@ class Warp:
         bent_x = x_m + self.bend_m[0] * sin(2 * pi * y_m / self.wavelength_m[0] + self.phase_rad[0])
         bent_y = y_m + self.bend_m[1] * sin(2 * pi * x_m / self.wavelength_m[1] + self.phase_rad[1])
         c, s = cos(self.angle_rad), sin(self.angle_rad)
-        return (
-            c * bent_x - s * bent_y + self.shift_m[0],
-            s * bent_x + c * bent_y + self.shift_m[1],
-        )
+        east, south = self.shift_m
+        return c * bent_x - s * bent_y + east, s * bent_x + c * bent_y + south
 
 
 def _subdivided(points_m: Points, step_m: float) -> Points:
@@ -177,14 +169,8 @@ class Plan:
         dx, dy = (x1 - x0, 0.0) if x1 - x0 > y1 - y0 else (0.0, y1 - y0)
         for k in range(count):
             a, b = k / count, (k + 1) / count
-            self._painted.append(
-                (
-                    x0 + dx * a,
-                    y0 + dy * a,
-                    x0 + dx * b if dx else x1,
-                    y0 + dy * b if dy else y1,
-                )
-            )
+            right, lower = x0 + dx * b if dx else x1, y0 + dy * b if dy else y1
+            self._painted.append((x0 + dx * a, y0 + dy * a, right, lower))
 
     def markings(self) -> Points:
         """Return all painted quadrilaterals, (N, 4, 2): no label of their own."""
@@ -198,21 +184,14 @@ class Plan:
             quads = quads[np.hypot(away[..., 0], away[..., 1]).min(axis=1) > reach_m]
         return quads
 
-    def building(
-        self,
-        x_m: float,
-        y_m: float,
-        length_m: float,
-        width_m: float,
-        heading_rad: float,
-        eaves_m: float,
-        roof: str,
-        rgb: Rgb,
-        seed: int,
-    ) -> None:
-        """Set a building."""
-        x, y, heading = self.warp.place(x_m, y_m, heading_rad)
-        self.buildings.append(Building(x, y, length_m, width_m, heading, eaves_m, roof, rgb, seed))
+    def put(self, item: Building | Thing) -> None:
+        """Set up a building, vehicle, person or obstacle that is given in plan coordinates."""
+        x, y, heading = self.warp.place(item.x_m, item.y_m, item.heading_rad)
+        placed = replace(item, x_m=x, y_m=y, heading_rad=heading)
+        if isinstance(placed, Building):
+            self.buildings.append(placed)
+        else:
+            self.things.append(placed)
 
     def tree(
         self, x_m: float, y_m: float, diameter_m: float, height_m: float, rgb: Rgb, kind: str
@@ -221,42 +200,15 @@ class Plan:
         x, y, heading = self.warp.place(x_m, y_m, (x_m * 12.9 + y_m * 78.2) % (2 * pi))
         self.trees.append(Tree(x, y, diameter_m, height_m, rgb, kind, heading))
 
-    def thing(
-        self,
-        sprite: str,
-        x_m: float,
-        y_m: float,
-        heading_rad: float,
-        length_m: float,
-        width_m: float,
-        rgb: Rgb,
-        label: Label,
-    ) -> None:
-        """Put a vehicle, person or obstacle."""
-        x, y, heading = self.warp.place(x_m, y_m, heading_rad)
-        self.things.append(Thing(sprite, x, y, heading, length_m, width_m, rgb, label))
-
     def barrier(
-        self,
-        x0: float,
-        y0: float,
-        x1: float,
-        y1: float,
-        width_m: float,
-        height_m: float,
-        rgb: Rgb,
-        label: Label = Label.OBSTACLE,
+        self, x0: float, y0: float, x1: float, y1: float, width_m: float, height_m: float, rgb: Rgb
     ) -> None:
         """Set up a fence, wall or hedge."""
         count = max(1, int(np.hypot(x1 - x0, y1 - y0) / 10.0))
         steps = np.linspace(0.0, 1.0, count + 1)[:, None]
         ends = self.warp.points(np.array([x0, y0]) + steps * np.array([x1 - x0, y1 - y0]))
-        for (ax, ay), (bx, by) in pairwise(ends):
-            self.barriers.append(
-                Barrier(
-                    (float(ax), float(ay)), (float(bx), float(by)), width_m, height_m, rgb, label
-                )
-            )
+        for (ax, ay), (bx, by) in pairwise(ends.tolist()):
+            self.barriers.append(Barrier((ax, ay), (bx, by), width_m, height_m, rgb))
 
 
 def strip(points_m: Points, width_m: float) -> Points:

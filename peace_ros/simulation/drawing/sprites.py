@@ -42,18 +42,10 @@ class _Sketch:
         """Draw a rectangle with corners cut by a fraction."""
         rows, columns = self.image.shape[:2]
         c = corner
-        shape = np.array(
-            [
-                (x0 + c, y0),
-                (x1 - c, y0),
-                (x1, y0 + c),
-                (x1, y1 - c),
-                (x1 - c, y1),
-                (x0 + c, y1),
-                (x0, y1 - c),
-                (x0, y0 + c),
-            ]
-        )
+        shape = np.array([
+            (x0 + c, y0), (x1 - c, y0), (x1, y0 + c), (x1, y1 - c),
+            (x1 - c, y1), (x0 + c, y1), (x0, y1 - c), (x0, y0 + c),
+        ])  # fmt: skip
         self.fill(shape * (columns, rows), grey, paint, height)
 
     def disc(
@@ -284,7 +276,7 @@ def stamp_barrier(canvas: Canvas, barrier: Barrier) -> None:
     alpha = canvas.coverage([shape], region)
     canvas.blend(region, alpha, barrier.rgb)
     own = alpha >= min(0.5, 0.6 * barrier.width_m / window.gsd_m)
-    canvas.labels[region][own] = barrier.label
+    canvas.labels[region][own] = Label.OBSTACLE
     height = canvas.height_m[region]
     height[own] = np.maximum(height[own], barrier.height_m)
 

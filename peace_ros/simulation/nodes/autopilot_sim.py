@@ -32,7 +32,6 @@ class AutopilotSimNode(PeaceNode):
 
         Raises:
             PeaceError: parameters cannot be used or the port is taken.
-
         """
         super().__init__('autopilot_sim', *AUTOPILOT_SIM, **options)
         parameters = self.filled(AutopilotParameters)

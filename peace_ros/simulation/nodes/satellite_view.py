@@ -33,7 +33,6 @@ def create_world(options: SatelliteViewOptions) -> World:
 
     Raises:
         WorldError: it cannot be loaded or drawn.
-
     """
     if options.world:
         world = load_world(options.world, options.gsd or None, options.labels or None)
@@ -50,7 +49,6 @@ class SatelliteViewNode(PeaceNode):
 
         Raises:
             PeaceError: parameters or world cannot be used.
-
         """
         super().__init__('satellite_view', *SATELLITE_VIEW, **options)
         chosen = self.filled(SatelliteViewOptions)

@@ -34,7 +34,6 @@ class TwistVehicle:
 
         Raises:
             VehicleError: a component is not finite; the velocity before it stays.
-
         """
         velocity = (forward_m_s, left_m_s, up_m_s, yaw_left_rad_s)
         if not all(map(isfinite, velocity)):

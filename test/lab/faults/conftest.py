@@ -7,7 +7,7 @@ from __future__ import annotations
 import pytest
 
 from peace_ros.lab.faults.fault import Expected, Fault
-from peace_ros.lab.faults.injections import Killed
+from peace_ros.lab.faults.injections import injection
 from peace_ros.lab.faults.record import Record, Said, Sent, TruthSample
 
 
@@ -22,7 +22,9 @@ def stopping() -> Fault:
         recovers=('LANDING',),
         recovers_within_s=4.0,
     )
-    return Fault('stops', 'Something stops.', Killed('segmentation'), expected, 'HOLD.')
+    return Fault(
+        'stops', 'Something stops.', injection({'kill': 'segmentation'}), expected, 'HOLD.'
+    )
 
 
 def landing(*, hold_s: float = 2.0, fault_s: float = 5.0, end_s: float = 8.0) -> Record:

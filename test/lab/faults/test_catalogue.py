@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -151,9 +153,16 @@ def test_a_fault_is_read_from_a_file(tmp_path: Path) -> None:
     (fault,) = load(written(tmp_path, lead='{heatmap: nothing}', at='{state: HOLD}'))
     assert (fault.name, fault.group, fault.at.state) == ('my_fault', 'mine', 'HOLD')
     assert fault.expected.allowed == (*UNDER_WAY, 'HOLD')
-    ((delay_s, message),) = fault.injection.make()('picture')
+    tampers: dict[str, Any] = {}
+    bench: Any = SimpleNamespace(node=SimpleNamespace(tamper=tampers.__setitem__))
+    fault.injection.begin(bench)
+    ((delay_s, message),) = tampers['image']('picture')
     assert (delay_s, message) == (2.0, 'picture')
-    assert list(fault.lead.make()('heatmap')) == []
+    fault.lead.begin(bench)
+    assert list(tampers['heatmap']('heatmap')) == []
+    fault.injection.end()
+    assert tampers['image'] is None
+    assert tampers['heatmap'] is not None
 
 
 @pytest.mark.parametrize(

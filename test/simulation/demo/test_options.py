@@ -134,13 +134,13 @@ def test_the_start_follows_the_seed_and_shifts_the_world(photo, tmp_path) -> Non
         assert abs(start[1]) <= 45.0
         starts.add(start)
     assert len(starts) == 5
-    given = prepare_world(DemoOptions(world=photo, gsd_m=1.0, start=(30.0, -20.0)), tmp_path)
+    given = prepare_world(DemoOptions(world=photo, gsd_m=1.0, start='30,-20'), tmp_path)
     column, row = given.world.pixel(0.0, 0.0)
     assert (column, row) == pytest.approx((199.5 + 30.0, 149.5 + 20.0))
 
 
 def wiring(tmp_path, photo, **changes) -> Wiring:
-    prepared = prepare_world(DemoOptions(world=photo, gsd_m=0.5, start=(1.0, 2.0)), tmp_path)
+    prepared = prepare_world(DemoOptions(world=photo, gsd_m=0.5, start='1,2'), tmp_path)
     plain = {
         'world': prepared,
         'camera_px': 704,

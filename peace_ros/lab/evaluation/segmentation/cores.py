@@ -89,7 +89,6 @@ def build_cores(config: str, overrides: Overrides) -> Cores | str:
     Raises:
         ConfigurationError: the preset or a parameter cannot be used.
         BundleError: a model that is there cannot be used.
-
     """
     preset = load_preset(config)
     given = {'threads': overrides.threads, 'fusion': overrides.fusion, 'terms': overrides.terms}
