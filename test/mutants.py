@@ -118,6 +118,11 @@ def _copy_checkout(copy: Path) -> bool:
     listed = ['git', 'ls-files', '-z', '--cached', '--others', '--exclude-standard']
     names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     tests_changed = False
+    for path in [*copy.rglob('*.py')]:
+        here = path.relative_to(copy)
+        name = here.relative_to('mutants') if here.parts[0] == 'mutants' else here
+        if not (ROOT / name).is_file():
+            path.unlink()
     for name in filter(None, names.split('\0')):
         source, target = ROOT / name, copy / name
         if name == 'pyproject.toml' and target.is_file():
@@ -135,10 +140,11 @@ def _copy_checkout(copy: Path) -> bool:
 def _results(copy: Path) -> dict[str, Path]:
     """Module -> file of its results."""
     folder = copy / 'mutants' / 'peace_ros'
-    return {
+    found = {
         str(path.relative_to(folder)).removesuffix('.meta'): path
         for path in sorted(folder.rglob('*.py.meta'))
     }
+    return {name: path for name, path in found.items() if (ROOT / 'peace_ros' / name).is_file()}
 
 
 def _change_results(copy: Path, concerns, code: int | None) -> None:
