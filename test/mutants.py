@@ -19,6 +19,7 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import NamedTuple
 
@@ -139,12 +140,13 @@ def _copy_checkout(copy: Path) -> bool:
 
 def _results(copy: Path) -> dict[str, Path]:
     """Module -> file of its results."""
-    folder = copy / 'mutants' / 'peace_ros'
-    found = {
-        str(path.relative_to(folder)).removesuffix('.meta'): path
-        for path in sorted(folder.rglob('*.py.meta'))
-    }
-    return {name: path for name, path in found.items() if (ROOT / 'peace_ros' / name).is_file()}
+    folder, found = copy / 'mutants' / 'peace_ros', {}
+    for path in sorted(folder.rglob('*.py.meta')):
+        module = str(path.relative_to(folder)).removesuffix('.meta')
+        mutated = any(fnmatch(module, each) for each in GROUPS[copy.name].modules)
+        if mutated and (ROOT / 'peace_ros' / module).is_file():
+            found[module] = path
+    return found
 
 
 def _change_results(copy: Path, concerns, code: int | None) -> None:
@@ -169,8 +171,8 @@ def _change(copy: Path, module: str, mutant: str) -> list[str]:
 
 
 def _concerns_types_only(copy: Path, module: str, mutant: str, code: int | None) -> bool:
-    """Whether a mutant that has not run changes nothing but what `cast` is told."""
-    if code is not None:
+    """Whether a mutant that no test killed changes nothing but what `cast` is told."""
+    if code not in {None, SURVIVED}:
         return False
     lines = _change(copy, module, mutant)
     gone, come = (
@@ -186,22 +188,23 @@ def table() -> None:
     total: Counter[str] = Counter()
     survivors = []
     print('| module | mutants | killed | survived | share | not run |\n|---|---|---|---|---|---|')
-    for name in GROUPS:
-        for module, path in _results(COPIES / name).items():
+    for copy in map(COPIES.joinpath, GROUPS):
+        for module, path in _results(copy).items():
+            counts: Counter[str] = Counter()
             codes = json.loads(path.read_text(encoding='utf-8'))['exit_code_by_key']
-            counts = Counter(status_by_exit_code[code] for code in codes.values())
-            del counts['skipped']
+            for mutant, code in codes.items():
+                status = status_by_exit_code[code]
+                if status in LEFT and not _concerns_types_only(copy, module, mutant, code):
+                    change = '\n'.join(_change(copy, module, mutant))
+                    survivors.append(f'\n{mutant} ({status})\n{change}')
+                elif status in LEFT or status == 'skipped':
+                    continue
+                counts[status] += 1
             total += counts
             if counts:
                 print(_row(f'`{module}`', counts))
-            survivors += [
-                (COPIES / name, module, mutant, status_by_exit_code[code])
-                for mutant, code in codes.items()
-                if status_by_exit_code[code] in LEFT
-            ]
     print(_row('all', total))
-    for copy, module, mutant, how in survivors:
-        print('\n' + '\n'.join([f'{mutant} ({how})', *_change(copy, module, mutant)]))
+    print('\n'.join(survivors))
 
 
 def _row(name: str, counts: Counter[str]) -> str:

@@ -78,6 +78,8 @@ def test_even_ground_agrees_with_nothing() -> None:
     even = np.full((128, 128), 90.0, np.float32)
     assert steps._agreement(even, even, 0, 0) == 0.0
     assert steps._agreement(even, texture(128, 128), 0, 0) == 0.0
+    faint = 1e-4 * (texture(128, 128) - 120.0)
+    assert steps._agreement(faint, faint, 0, 0) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_a_shift_is_found_to_a_part_of_a_pixel() -> None:
