@@ -338,6 +338,14 @@ def test_a_disc_scores_as_its_worst_cell_and_is_as_old_as_its_oldest() -> None:
     assert left > 0.75
     assert 0.65 > right > 0.55
     assert safety_map.score_around(0.0, east_m - 0.5, 1.0, S)[0] == pytest.approx(right, abs=1e-4)
+    corner = SafetyMap(MapParameters(map_size_m=40.0))
+    safety = np.full((352, 352), 0.9, np.float32)
+    safety[:140, :140] = 0.6
+    corner.add(Heatmap(safety, S), CAMERA, pose_of(60.0, 0, 0))
+    edge_m = (175.5 - 140.0) / CAMERA.focal_px * 60.0
+    for aside_m, score in ((2.4, left), (1.8, right)):
+        found = corner.score_around(edge_m - aside_m, aside_m - edge_m, 3.0, S)
+        assert found[0] == pytest.approx(score, abs=1e-4)
     tiny = safety_map.score_around(0.25, 0.25, 0.0, S)
     assert tiny[0] == pytest.approx(left, abs=1e-4)
 
