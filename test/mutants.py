@@ -35,8 +35,8 @@ class Group(NamedTuple):
     without: tuple[str, ...] = ()
 
 
-# The tests are those beside the modules, but for what takes seconds: it would be run for every
-# mutant, and a test that says what was broken is worth more.
+# The tests are those beside the modules, but for files that take seconds: they would be run for
+# every mutant, and a test that says what was broken is worth more.
 GROUPS = {
     'segmentation': Group(
         ['core/segmentation/fusion.py', 'core/segmentation/looks.py'],
@@ -45,21 +45,23 @@ GROUPS = {
     'mapping': Group(
         ['core/mapping/*.py'],
         ['core/mapping'],
-        (
-            'core/mapping/test_veto.py::test_no_order_of_frames_loses_a_veto',
-            'core/mapping/test_projection.py::test_what_a_pixel_shows_is_found_again_on_the_ground',
-        ),
+        ('core/mapping/test_veto.py', 'core/mapping/test_projection.py')
+        + ('core/mapping/test_registration.py', 'core/mapping/test_safety_map.py'),
     ),
     'landing': Group(
-        ['core/landing/[!c]*.py'],  # all but core.py
+        ['core/landing/[!cs]*.py', 'core/landing/si*.py'],  # but core.py and states.py
         ['core/landing'],
-        ('core/landing/test_flights.py', 'core/landing/test_core.py'),
+        ('core/landing/test_flights.py', 'core/landing/test_core.py')
+        + ('core/landing/test_states.py', 'core/landing/test_helm.py')
+        + ('core/landing/test_odometry.py',),
     ),
+    'states': Group(['core/landing/states.py'], ['core/landing/test_states.py']),
     'core': Group(['core/landing/core.py'], ['core/landing/test_core.py']),
     'vehicle': Group(
         ['core/vehicle/sender.py', 'core/vehicle/obedience.py'],
         [
             'core/vehicle/test_sender.py',
+            'core/vehicle/test_sender_limits.py',
             'core/vehicle/test_obedience.py',
             'core/vehicle/test_obedience_limits.py',
         ],
