@@ -53,3 +53,50 @@ def test_what_is_not_known_has_no_key():
     assert pairs['outcome'] == ''
     assert pairs['map_age_s'] == 'inf'
     assert not [key for key in pairs if key.startswith(('site_', 'focus_', 'north', 'heatmaps'))]
+
+
+def test_every_pair_of_a_decision_has_its_key():
+    decision = replace(
+        NOTHING,
+        state=State.AIMING,
+        reason='moving over it',
+        setpoint=Setpoint(7, 1.0, -0.5, 0.25),
+        verdict=Verdict.found(SITE),
+        effective_threshold=0.75,
+        map_age_s=0.125,
+        focus=Focus(1.0, 2.0, 30.0),
+        outcome='handover',
+        time_in_state_s=3.5,
+        failed_sites=2,
+        attempts=1,
+        counts={'used': 4},
+    )
+    assert decision_pairs(decision, Pose(7, 10.0, 20.0, -42.0, (1.0, 0.0, 0.0, 0.0), 42.0)) == {
+        'state': 'AIMING',
+        'reason': 'moving over it',
+        'outcome': 'handover',
+        'verdict': 'SITE',
+        'verdict_reason': 'site with 6.2 m of clearance',
+        'guard': '',
+        'failed_sites': '2',
+        'attempts': '1',
+        'effective_threshold': '0.750',
+        'map_age_s': '0.125',
+        'v_north_m_s': '1.000',
+        'v_east_m_s': '-0.500',
+        'v_down_m_s': '0.250',
+        'time_in_state_s': '3.500',
+        'north_m': '10.000',
+        'east_m': '20.000',
+        'altitude_agl_m': '42.000',
+        'site_north_m': '5.000',
+        'site_east_m': '-3.000',
+        'site_clearance_m': '6.250',
+        'site_area_m2': '200.000',
+        'site_confidence': '0.900',
+        'site_age_s': '0.400',
+        'focus_north_m': '1.000',
+        'focus_east_m': '2.000',
+        'focus_radius_m': '30.000',
+        'heatmaps/used': '4',
+    }

@@ -43,6 +43,7 @@ def view_of(ground: np.ndarray, altitude_m: float = 30.0, **deg: float) -> View:
         ((3000, 4), (256, 1)),
         ((4, 3000), (1, 256)),
         ((256, 200), (256, 200)),
+        ((150, 200), (150, 200)),
     ],
 )
 def test_pictures_keep_their_shape_and_lose_their_size(
@@ -55,9 +56,9 @@ def test_pictures_are_grey_as_people_see_it_and_small_by_averaging() -> None:
     red = np.zeros((8, 8, 3), np.uint8)
     red[..., 0] = 255
     assert np.all(small_grey(red) == 76)
-    chequered = np.zeros((512, 512, 3), np.uint8)
-    chequered[::2, ::2] = chequered[1::2, 1::2] = 255
-    assert set(np.unique(small_grey(chequered))) <= {127, 128}
+    striped = np.zeros((768, 768, 3), np.uint8)
+    striped[:, ::3] = 255
+    assert np.all(small_grey(striped) == 85)
 
 
 @pytest.mark.parametrize(('top', 'left'), [(0, 0), (4, 3), (-5, 6), (7, -8), (-9, -2)])
@@ -78,6 +79,8 @@ def test_even_ground_agrees_with_nothing() -> None:
     even = np.full((128, 128), 90.0, np.float32)
     assert steps._agreement(even, even, 0, 0) == 0.0
     assert steps._agreement(even, texture(128, 128), 0, 0) == 0.0
+    faint = 1e-4 * (texture(128, 128) - 120.0)
+    assert steps._agreement(faint, faint, 0, 0) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_a_shift_is_found_to_a_part_of_a_pixel() -> None:
@@ -121,6 +124,7 @@ def test_texture_across_is_weighed_against_texture_along(
         rows, columns = (rows + columns) / np.sqrt(2.0), (rows - columns) / np.sqrt(2.0)
     ground = (20.0 * np.sin(columns) + along * 20.0 * np.sin(rows)).astype(np.float32)
     assert steps._cross_texture(ground) == pytest.approx(ratio, abs=0.08)
+    assert steps._cross_texture(1e-3 * ground) == pytest.approx(ratio, abs=0.08)
 
 
 def test_even_ground_has_no_texture_across() -> None:
@@ -164,6 +168,17 @@ def test_a_patch_must_be_in_view_as_a_whole() -> None:
             assert steps._patch(view, CAMERA, aside, 0.5 * shown_m) is not None
             aside[axis] = sign * (room_m + 0.02 * shown_m)
             assert steps._patch(view, CAMERA, aside, 0.5 * shown_m) is None
+
+
+@pytest.mark.parametrize('towards', [0, 90, 180, 270])
+def test_each_corner_of_a_patch_must_be_in_view(towards: int) -> None:
+    """The camera heads north-east, so that corners of the patch point at edges of the picture."""
+    view, edge_m = view_of(texture(256, 256), yaw=45.0), 8.0
+    direction = np.radians(45.0 + towards)
+    along = np.array([np.cos(direction), np.sin(direction)])
+    room_m = 127.5 / CAMERA.focal_px * 30.0 - 63.5 / 128.0 * edge_m * np.sqrt(2.0)
+    assert steps._patch(view, CAMERA, (room_m - 0.002 * edge_m) * along, edge_m) is not None
+    assert steps._patch(view, CAMERA, (room_m + 0.002 * edge_m) * along, edge_m) is None
 
 
 def test_above_the_horizon_there_is_no_ground() -> None:
@@ -215,9 +230,10 @@ def test_a_shift_beyond_a_third_of_the_patch_is_too_far() -> None:
     ground = texture(400, 400)
     before = view_of(ground[20:276, 20:276])
     for moved_px, far in ((72, False), (92, True)):
-        after = view_of(ground[20:276, 20 + moved_px : 276 + moved_px])
-        found = register(before, after, CAMERA)
-        assert (found is Mismatch.FAR) == far
+        east = view_of(ground[20:276, 20 + moved_px : 276 + moved_px])
+        south = view_of(ground[20 + moved_px : 276 + moved_px, 20:276])
+        for after in (east, south):
+            assert (register(before, after, CAMERA) is Mismatch.FAR) == far
 
 
 def test_ground_of_little_texture_or_texture_of_one_direction_is_refused() -> None:

@@ -102,6 +102,8 @@ def test_heights_spread_as_their_standard_deviation_over_the_known() -> None:
                 assert enough[row, column] == (share > 0.5)
             if len(values):
                 assert spread[row, column] == pytest.approx(values.std(), abs=1e-6)
+    far, _ = steps._spread_m(down + 1e6, known, (3, 5))
+    np.testing.assert_allclose(far, spread, atol=1e-6)
     half = np.zeros((2, 1), np.bool_)
     half[0] = True
     assert steps._spread_m(np.ones((2, 1)), half, (1, 2))[1][1, 0], 'half is enough'

@@ -187,5 +187,6 @@ def test_no_order_of_frames_loses_a_veto(*, camera, look, pose_at, frames):
 
 
 def test_ground_that_was_called_unsafe_cannot_count_as_clear():
+    assert MapParameters(neutral_score=0.6, clear_score=0.6).clear_score == 0.6
     with pytest.raises(ConfigurationError, match='clear_score'):
         MapParameters(neutral_score=0.8)

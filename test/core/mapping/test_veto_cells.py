@@ -193,6 +193,18 @@ def test_vetoes_widen_with_their_waits() -> None:
     assert looks.closed(2.0) == []
 
 
+def test_looks_are_counted_only_where_a_veto_has_widened_to() -> None:
+    looks = Looks()
+    for number in range(2):
+        looks.take(1.0 + 0.1 * number, unsafe=at((4, 5)))
+    looks.veto.widen(np.ones((1, 3), np.uint8))
+    looks.take(1.2, unsafe=at((3, 5), (4, 6)))
+    for number in range(3):
+        looks.take(1.3 + 0.1 * number, clear=~NOTHING)
+    assert (3, 5) not in looks.closed(3.3), 'its first look'
+    assert (4, 6) in looks.closed(7.1), 'its third one'
+
+
 def test_a_window_is_a_part_of_the_map() -> None:
     looks = Looks()
     unsafe = np.array([[False, True], [False, False], [False, False]])

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from math import cos, radians, tan
 
+import cv2
 import numpy as np
 import pytest
 
@@ -251,6 +252,43 @@ def test_what_is_known_grows_less_when_the_map_loses_accuracy() -> None:
     assert np.array_equal(safety_map.layers(S).looks, after.looks)
 
 
+def test_what_is_unsafe_grows_round_and_by_one_cell_at_least() -> None:
+    safety_map = SafetyMap(MapParameters(map_size_m=40.0))
+    safety = np.full((352, 352), 0.9, np.float32)
+    safety[170:174, 170:174] = 0.3
+    safety_map.add(Heatmap(safety, S), CAMERA, pose_of(20.0, 0.0, 0.0))
+
+    def doubtful() -> np.ndarray:
+        layers = safety_map.layers(S)
+        return (layers.score < 0.7) & (layers.looks > 0)
+
+    rows, columns = (slice(each.min() - 3, each.max() + 4) for each in np.nonzero(doubtful()))
+    before = doubtful()[rows, columns].astype(np.uint8)
+    safety_map.widen_unsafe(0.1)
+    cross = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
+    once = cv2.dilate(before, cross)
+    assert np.array_equal(doubtful()[rows, columns], once)
+    safety_map.widen_unsafe(0.9)
+    disc = np.ones((5, 5), np.uint8)
+    disc[np.ix_([0, 4], [0, 1, 3, 4])] = 0
+    assert np.array_equal(doubtful()[rows, columns], cv2.dilate(once, disc))
+
+
+def test_a_map_that_loses_accuracy_does_not_know_what_it_saw_last() -> None:
+    safety_map = SafetyMap(MapParameters(map_size_m=40.0))
+    safety = np.full((352, 352), 0.9, np.float32)
+    safety_map.add(Heatmap(safety, S), CAMERA, pose_of(20.0, 0.0, 0.0))
+    safety_map.add(Heatmap(safety, 3 * S), CAMERA, pose_of(10.0, 0.0, 0.0))
+
+    def fresh_rows() -> tuple[int, int]:
+        rows = np.nonzero((safety_map.layers(3 * S).age_s < 1.0).any(axis=1))[0]
+        return int(rows.min()), int(rows.max())
+
+    low, high = fresh_rows()
+    safety_map.widen_unsafe(1.5)
+    assert fresh_rows() == (low + 3, high - 3)
+
+
 def test_a_square_of_the_layers_holds_every_cell_that_it_touches() -> None:
     safety_map = SafetyMap(MapParameters(map_size_m=40.0))
     safety_map.add(Heatmap(np.full((8, 8), 0.9, np.float32), 0), CAMERA, pose_of(60.0, 0, 0))
@@ -300,6 +338,14 @@ def test_a_disc_scores_as_its_worst_cell_and_is_as_old_as_its_oldest() -> None:
     assert left > 0.75
     assert 0.65 > right > 0.55
     assert safety_map.score_around(0.0, east_m - 0.5, 1.0, S)[0] == pytest.approx(right, abs=1e-4)
+    corner = SafetyMap(MapParameters(map_size_m=40.0))
+    safety = np.full((352, 352), 0.9, np.float32)
+    safety[:140, :140] = 0.6
+    corner.add(Heatmap(safety, S), CAMERA, pose_of(60.0, 0, 0))
+    edge_m = (175.5 - 140.0) / CAMERA.focal_px * 60.0
+    for aside_m, score in ((2.4, left), (1.8, right)):
+        found = corner.score_around(edge_m - aside_m, aside_m - edge_m, 3.0, S)
+        assert found[0] == pytest.approx(score, abs=1e-4)
     tiny = safety_map.score_around(0.25, 0.25, 0.0, S)
     assert tiny[0] == pytest.approx(left, abs=1e-4)
 
