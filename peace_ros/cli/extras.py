@@ -22,7 +22,6 @@ EXTRA_OF = {
     'transformers': 'export',
     'safetensors': 'export',
     'onnx': 'export',
-    'PIL': 'export',
 }
 """Module -> the extra of setup.cfg that installs its package."""
 PACKAGE_OF = {

@@ -94,7 +94,7 @@ def test_each_module_of_others_is_installed_by_something_that_a_sentence_names()
     ('module', 'command'),
     [
         ('rosbags.serde', 'pip install ".[simulation]" in the checkout'),
-        ('PIL', 'the package pillow is not installed: run pip install ".[export]" in the checkout'),
+        ('PIL', 'the package pillow is not installed: run pip install pillow'),
         ('cv2', 'the package opencv-python-headless is not installed: run pip install opencv-'),
         ('std_srvs.srv', 'source the setup file of ROS 2 Jazzy (on x86_64 without ROS: run pip'),
     ],

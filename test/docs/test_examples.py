@@ -20,6 +20,7 @@ SHOWN = {
     'land_on_heatmaps.py': 'HANDOVER: ',
     'custom_segmenter.py': '% of the image is called safe',
     'judge_bag.py': 'state at the end: ',
+    'custom_dialect.py': 'poshold',
 }
 """What an example must have printed."""
 
