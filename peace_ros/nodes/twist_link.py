@@ -13,7 +13,7 @@ from math import isfinite
 from geometry_msgs.msg import Twist
 
 from peace_ros.core.domain import Pose, Setpoint, Telemetry, VehicleError
-from peace_ros.core.vehicle import Answer, RequestResult
+from peace_ros.core.vehicle import Answer, LineCounts, RequestResult
 from peace_ros.nodes.messages import setpoint_to_body_twist
 
 _POSES = 256
@@ -50,6 +50,16 @@ class TwistLink:
     def position_problem(self) -> str:
         """Nothing."""
         return ''
+
+    @property
+    def warning(self) -> str:
+        """Nothing."""
+        return ''
+
+    @property
+    def counts(self) -> LineCounts:
+        """Nothing is counted here."""
+        return LineCounts()
 
     def telemetry(self) -> Telemetry:
         """Return the newest pose as telemetry of an armed, obedient, flying vehicle."""

@@ -63,7 +63,8 @@ class VehicleAccess:
             self._subscribe_pose(options)
             return
         self.name = options.mavlink
-        check_access(options.mavlink, options.dialect, parameters.signing_key_file)
+        key_file, system_id = parameters.signing_key_file, parameters.system_id
+        check_access(options.mavlink, options.dialect, key_file, system_id)
         timeout_s = min(_TRY_S, parameters.connect_timeout_s)
 
         open_link = partial(
@@ -101,6 +102,8 @@ class VehicleAccess:
             return
         if link.problem:
             self._node.say('vehicle', link.problem)
+        if link.warning:
+            self._node.say('line', link.warning)
         link.report_health(int(_HEALTH.get(decision.state, mavlink.MAV_STATE_ACTIVE)))
         handed_over = decision.state is State.HANDOVER
         self._after.follow(link, decision.site, handed_over=handed_over)

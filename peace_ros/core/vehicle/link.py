@@ -16,8 +16,8 @@ from peace_ros.core.vehicle.dialects import AUTO, check_dialect
 from peace_ros.core.vehicle.lasting import LastingTransport
 from peace_ros.core.vehicle.mavlink import MavlinkLink
 from peace_ros.core.vehicle.parameters import VehicleParameters
-from peace_ros.core.vehicle.result import RequestResult
-from peace_ros.core.vehicle.signing import read_key
+from peace_ros.core.vehicle.result import LineCounts, RequestResult
+from peace_ros.core.vehicle.signing import Signer
 from peace_ros.core.vehicle.transport import parse_url
 
 
@@ -37,6 +37,16 @@ class VehicleLink(Protocol):
     @property
     def position_problem(self) -> str:
         """Why the vehicle will not obey velocities now, empty when nothing speaks against it."""
+        ...
+
+    @property
+    def warning(self) -> str:
+        """What a person should know of the line, empty when nothing."""
+        ...
+
+    @property
+    def counts(self) -> LineCounts:
+        """Messages that were not used, since the line was opened."""
         ...
 
     def telemetry(self) -> Telemetry:
@@ -91,22 +101,23 @@ class VehicleLink(Protocol):
         ...
 
 
-def check_access(url: str, dialect: str, signing_key_file: str) -> None:
+def check_access(url: str, dialect: str, signing_key_file: str, system_id: int) -> None:
     """Refuse what no autopilot could mend, before anything is opened.
 
     Args:
         url: See :func:`open_vehicle`.
         dialect: ``auto`` or a name among the registered ones.
         signing_key_file: Empty: no signing.
+        system_id: Of this companion: each has a file of time stamps beside the key.
 
     Raises:
-        ConfigurationError: The signing key cannot be read.
+        ConfigurationError: The signing key cannot be read, or its time stamps are damaged.
         VehicleError: The URL is not understood, or the dialect is not known.
     """
     parse_url(url)
     check_dialect(dialect)
     if signing_key_file:
-        read_key(signing_key_file)
+        Signer.from_file(signing_key_file, system_id)
 
 
 def open_vehicle(
@@ -133,7 +144,7 @@ def open_vehicle(
         VehicleError: Wrong URL or dialect, port in use, nothing heard in time.
     """
     chosen = parameters or VehicleParameters()
-    check_access(url, dialect, chosen.signing_key_file)
+    check_access(url, dialect, chosen.signing_key_file, chosen.system_id)
     if timeout_s is not None:
         chosen = replace(chosen, connect_timeout_s=timeout_s)
     try:
