@@ -119,8 +119,7 @@ class MavlinkLink:
             age_s = self._heard().heartbeat_age_s(time.monotonic_ns())
         if age_s <= limit_s:
             return ''
-        age = f'{age_s:.0f} s, limit {limit_s} s'
-        return f'no HEARTBEAT of the autopilot for {age}: check its power and the line'
+        return f'no HEARTBEAT for more than {limit_s:g} s: check the autopilot and the line'
 
     @property
     def position_problem(self) -> str:
