@@ -262,3 +262,15 @@ def test_zero_in_every_state_that_stands():
         trip = Trip(LandingParameters(giveup_after_s=60.0), state=state)
         command = trip.step(landed=True)
         assert command.setpoint.is_zero
+
+
+def test_an_age_that_grows_is_no_new_reason():
+    trip = Trip()
+    trip.step()
+    problems = [f'HEARTBEAT is {age / 10} s old' for age in range(36, 46)]
+    told = {
+        trip.step(pose=None, position_problem=problem).reason for problem in (*problems, 'jumped')
+    }
+    assert len(told) == 2
+    assert any('3.6 s old' in reason for reason in told)
+    assert any('jumped' in reason for reason in told)
