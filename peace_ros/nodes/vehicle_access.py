@@ -57,6 +57,7 @@ class VehicleAccess:
         )
         self._connection: Connection[VehicleLink] | None = None
         self._twist: TwistLink | None = None
+        self._warned = ''
         if options.interface == 'twist':
             self.name = 'topics pose and cmd_vel'
             self._twist = TwistLink(node.create_publisher(Twist, 'cmd_vel', COMMAND).publish)
@@ -102,8 +103,9 @@ class VehicleAccess:
             return
         if link.problem:
             self._node.say('vehicle', link.problem)
-        if link.warning:
-            self._node.say('line', link.warning)
+        if link.warning != self._warned:
+            self._warned = link.warning
+            self._node.say('line', self._warned)
         link.report_health(int(_HEALTH.get(decision.state, mavlink.MAV_STATE_ACTIVE)))
         handed_over = decision.state is State.HANDOVER
         self._after.follow(link, decision.site, handed_over=handed_over)

@@ -16,7 +16,9 @@ class Line:
 
 
 def test_messages_that_were_not_used_are_counted_and_two_addresses_said(values_of):
-    decision = Decision(State.IDLE, 'not engaged', Setpoint(0), Verdict.no_zone('no map'), 0.8, 1.0, None)
+    decision = Decision(
+        State.IDLE, 'not engaged', Setpoint(0), Verdict.no_zone('no map'), 0.8, 1.0, None
+    )
     told = Telemetry(1, mode='GUIDED')
     values = values_of(status_message(decision, VehicleSituation(told, 0.1, line=Line()), 5))
     assert values['line_warning'] == Line.warning

@@ -27,7 +27,9 @@ MAX_POSES = 256
 ESTIMATOR_LIMIT_S = 3.0
 """Age at which the report of the position filter about itself is stale."""
 KNOWS_POSITION = mavlink.ESTIMATOR_POS_HORIZ_REL | mavlink.ESTIMATOR_POS_HORIZ_ABS
+GLOBAL_POSITION = mavlink.ESTIMATOR_POS_HORIZ_ABS
 GUESSES_POSITION = mavlink.ESTIMATOR_CONST_POS_MODE
+"""PX4 sets it for a vehicle at rest too, beside the bit of a global position, which it then has."""
 IN_ORDER = frozenset(
     {'LOCAL_POSITION_NED', 'ATTITUDE', 'ATTITUDE_QUATERNION', 'GLOBAL_POSITION_INT'}
 )
@@ -367,7 +369,8 @@ def _size(m: Any) -> float:
 
 
 def _has_position(flags: int) -> bool:
-    return bool(flags & KNOWS_POSITION) and not flags & GUESSES_POSITION
+    guesses = flags & GUESSES_POSITION and not flags & GLOBAL_POSITION
+    return bool(flags & KNOWS_POSITION) and not guesses
 
 
 def _absurd(kind: str, message: Any) -> str:

@@ -141,11 +141,6 @@ class MavlinkLink:
             return LineCounts(self._peer.ignored, *self._wire.refused, heard.rejected, heard.late)
 
     @property
-    def clock(self) -> TimeMap:
-        """The map from the autopilot's clock to ours, for inspection."""
-        return self._clock
-
-    @property
     def landed_state(self) -> int:
         """MAV_LANDED_STATE: 0 unknown, 1 ground, 2 air, 3 take-off, 4 landing."""
         with self._changed:

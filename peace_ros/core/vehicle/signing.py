@@ -14,7 +14,7 @@ import hashlib
 import hmac
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 from peace_ros.core.domain.errors import ConfigurationError
@@ -151,11 +151,9 @@ class Signer:
         self._save_due_s = now_s + SAVE_EVERY_S
         ahead = 0 if at_once else AHEAD
         with self._lock:
-            lines = [f'{min(self._sent + AHEAD, NEWEST)} {self._received}']
-            lines += [
-                f'{link} {system} {component} {min(stamp + ahead, NEWEST)}'
-                for (link, system, component), stamp in self._streams.items()
-            ]
+            stamps = {(*each, stamp + ahead) for each, stamp in self._streams.items()}
+            numbers = [(self._sent + AHEAD, self._received), *sorted(stamps)]
+        lines = (' '.join(str(min(each, NEWEST)) for each in line) for line in numbers)
         fresh = self._memory.with_name(f'{self._memory.name}.new')
         try:
             fresh.write_text('\n'.join((*lines, '')), encoding='ascii')
@@ -181,19 +179,15 @@ def _remembered(memory: Path | None) -> tuple[int, int, Stamps]:
         if memory is None:
             return 0, 0, {}
         content = memory.read_text(encoding='ascii')
-        (sent, received), *streams = (tuple(_numbers(line)) for line in content.splitlines())
+        sent, received, *rest = numbers = [int(word) for word in content.split()]
+        for each in numbers:
+            each.to_bytes(6, 'little')  # OverflowError beyond 48 bits
+        streams = zip(*(rest[i::4] for i in range(4)), strict=True)
         return sent, received, {(a, b, c): stamp for a, b, c, stamp in streams}
     except FileNotFoundError:
         return 0, 0, {}
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, OverflowError) as error:
         raise ConfigurationError(
             f'{memory} holds no time stamps of 48 bits ({error}), so messages of earlier flights '
             'could be replayed: restore it, or set a new key on both sides and delete it'
         ) from error
-
-
-def _numbers(line: str) -> Iterator[int]:
-    for word in line.split():
-        if not 0 <= (number := int(word)) <= NEWEST:
-            raise ValueError(f'{word} is out of range')
-        yield number

@@ -206,7 +206,7 @@ def test_battery_and_clock_come_along(flying, eventually):
     sim, link = flying
     inject(sim, 'battery', remaining=0.42)
     assert eventually(lambda: link.telemetry().battery_remaining == pytest.approx(0.42), 3.0)
-    assert eventually(lambda: link.clock.samples > 0 or link.clock.steps > 0)
+    assert eventually(lambda: link._clock.samples > 0 or link._clock.steps > 0)
 
 
 def test_a_refusal_and_a_silence_are_told_apart(flying):
