@@ -103,7 +103,7 @@ class VehicleAccess:
             return
         if link.problem:
             self._node.say('vehicle', link.problem)
-        if link.warning != self._warned:
+        if link.warning not in {'', self._warned}:
             self._warned = link.warning
             self._node.say('line', self._warned)
         link.report_health(int(_HEALTH.get(decision.state, mavlink.MAV_STATE_ACTIVE)))
