@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """An autopilot dialect of your own: a copter that holds its position in POSHOLD.
 
-``custom_dialect.py URL`` asks a vehicle that is there; without URL, a simulated one. For the landing
+``custom_dialect.py URL`` asks a vehicle that is there; without URL a simulated one. For the landing
 node, register the dialect, then call ``peace_ros.nodes.landing.main`` with ``dialect:=poshold``.
 """
 

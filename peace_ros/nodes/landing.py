@@ -75,7 +75,7 @@ class LandingNode(PeaceNode):
             decision = self._core.step(at_ns, told, age_s)
             self._submit(decision)
         sender = '' if self._sender is None else self._sender.statistics().state.value
-        situation = VehicleSituation(told, age_s, self._access.problem, sender)
+        situation = VehicleSituation(told, age_s, self._access.problem, sender, link)
         self._publisher.publish(decision, situation, at_ns)
         self._access.follow(decision)
         self._engagement.engage_when_ready()

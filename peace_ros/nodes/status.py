@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, TwistStamped
@@ -14,6 +14,7 @@ from rclpy.node import Node
 from peace_ros.core.domain import Telemetry
 from peace_ros.core.landing import SILENT_STATES, Decision, State
 from peace_ros.core.landing.pairs import decision_pairs
+from peace_ros.core.vehicle import VehicleLink
 from peace_ros.nodes.messages import (
     ERROR,
     OK,
@@ -46,6 +47,8 @@ class VehicleSituation:
     """Why the vehicle cannot be reached, empty when it can."""
     sender: str = ''
     """What the timed sender does."""
+    line: VehicleLink | None = None
+    """Once the vehicle is reached: what its line warns of, and what it has not used."""
 
 
 class DecisionPublisher:
@@ -97,6 +100,7 @@ def status_message(decision: Decision, situation: VehicleSituation, at_ns: int) 
         'telemetry_age_s': f'{situation.telemetry_age_s:.2f}',
         'sender': situation.sender,
         **({} if told is None else _telemetry_pairs(told)),
+        **({} if situation.line is None else _line_pairs(situation.line)),
     }
     sentence = f'{state.value}: {reason}'
     return diagnostic_array(at_ns, 'landing/status', level, sentence, pairs.items())
@@ -110,6 +114,11 @@ def _telemetry_pairs(told: Telemetry) -> dict[str, str]:
         'landed': _truth(told.landed),
         'status_text': told.status_text,
     }
+
+
+def _line_pairs(line: VehicleLink) -> dict[str, str]:
+    counts = {f'messages_{name}': str(count) for name, count in asdict(line.counts).items()}
+    return {'line_warning': line.warning, **counts}
 
 
 def _truth(value: bool | None) -> str:

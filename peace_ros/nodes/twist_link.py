@@ -13,7 +13,7 @@ from math import isfinite
 from geometry_msgs.msg import Twist
 
 from peace_ros.core.domain import Pose, Setpoint, Telemetry, VehicleError
-from peace_ros.core.vehicle import Answer, RequestResult
+from peace_ros.core.vehicle import Answer, LineCounts, RequestResult
 from peace_ros.nodes.messages import setpoint_to_body_twist
 
 _POSES = 256
@@ -29,6 +29,10 @@ class TwistLink:
     """Nothing: a topic is always there, and the age of the pose is looked at elsewhere."""
     position_problem = ''
     """Nothing."""
+    warning = ''
+    """Nothing."""
+    counts = LineCounts()
+    """Nothing is counted here."""
 
     def __init__(self, publish: Callable[[Twist], None]) -> None:
         self._publish = publish

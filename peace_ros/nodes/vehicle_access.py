@@ -57,13 +57,15 @@ class VehicleAccess:
         )
         self._connection: Connection | None = None
         self._twist: TwistLink | None = None
+        self._warned = ''
         if options.interface == 'twist':
             self.name = 'topics pose and cmd_vel'
             self._twist = TwistLink(node.create_publisher(Twist, 'cmd_vel', COMMAND).publish)
             self._subscribe_pose(options)
             return
         self.name = options.mavlink
-        check_access(options.mavlink, options.dialect, parameters.signing_key_file)
+        key_file, system_id = parameters.signing_key_file, parameters.system_id
+        check_access(options.mavlink, options.dialect, key_file, system_id)
         timeout_s = min(_TRY_S, parameters.connect_timeout_s)
 
         open_link = partial(
@@ -101,6 +103,9 @@ class VehicleAccess:
             return
         if link.problem:
             self._node.say('vehicle', link.problem)
+        if link.warning not in {'', self._warned}:
+            self._warned = link.warning
+            self._node.say('line', self._warned)
         link.report_health(int(_HEALTH.get(decision.state, mavlink.MAV_STATE_ACTIVE)))
         handed_over = decision.state is State.HANDOVER
         self._after.follow(link, decision.site, handed_over=handed_over)

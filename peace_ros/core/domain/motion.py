@@ -9,7 +9,10 @@ Quaternions are (w, x, y, z) and rotate body FRD vectors into local NED.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, isfinite
+from math import hypot
+
+FARTHEST_M = 1e6
+"""No position or height of a multicopter is farther from the local origin; others are rejected."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +30,18 @@ class Pose:
 
     @property
     def has_position(self) -> bool:
-        """It tells where the vehicle is, not only its attitude and altitude."""
-        return isfinite(self.north_m) and isfinite(self.east_m)
+        """It tells where the vehicle can be, not only its attitude and altitude."""
+        return abs(self.north_m) <= FARTHEST_M and abs(self.east_m) <= FARTHEST_M
+
+    @property
+    def has_height(self) -> bool:
+        """Down and altitude are numbers that can be."""
+        return abs(self.down_m) <= FARTHEST_M and abs(self.altitude_agl_m) <= FARTHEST_M
+
+    @property
+    def has_attitude(self) -> bool:
+        """The quaternion is a rotation."""
+        return 0.98 < sum(part * part for part in self.quaternion_ned_frd) < 1.02
 
 
 @dataclass(frozen=True)

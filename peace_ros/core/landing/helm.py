@@ -7,6 +7,7 @@ Tests can give it any sequence of sightings and telemetry.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from math import hypot, inf
 
@@ -189,7 +190,8 @@ class Helm:
         before, now_ns = self.state, situation.now_ns
         state, reason = next_state(before, events, self._time_in_state_s(now_ns), self._p)
         self._new_engagement = False
-        self._reason = reason or self._reason
+        if reason and (state is not before or _words(reason) != _words(self._reason)):
+            self._reason = reason
         self._outcome = self._outcome or {
             State.HANDOVER: 'handover',
             State.ABORTED: 'aborted',
@@ -214,3 +216,8 @@ class Helm:
             around = (home.north_m, home.east_m)
             self._square = ExpandingSquare(around, p.search_spacing_m, radius_m)
         return self._square.target(pose)
+
+
+def _words(reason: str) -> str:
+    """Return a reason without its digits: an age that grows is no new reason."""
+    return re.sub(r'[\d.]+', '#', reason)

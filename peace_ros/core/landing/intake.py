@@ -63,7 +63,7 @@ class HeatmapIntake:
     def add_pose(self, pose: Pose) -> None:
         """Keep a pose, north and east NaN where unknown, and use the heatmaps that wait for it."""
         if not pose.has_position:
-            kept = self._carrier.add_pose(pose)
+            kept = pose.has_height and pose.has_attitude and self._carrier.add_pose(pose)
         else:
             before = self._poses.newest
             kept = self._poses.add(pose)

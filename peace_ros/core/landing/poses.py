@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from enum import Enum
-from math import hypot, isfinite, radians
+from math import hypot, radians
 
 from peace_ros.core.domain import Pose
 from peace_ros.core.domain.geometry import angle_between, interpolate
@@ -68,10 +68,8 @@ class PoseHistory:
         return self._poses[-1] if self._poses else None
 
     def add(self, pose: Pose) -> bool:
-        """Keep a pose; False when it is not finite or not newer than the last."""
-        numbers = (pose.north_m, pose.east_m, pose.down_m, pose.altitude_agl_m)
-        length_sq = sum(part * part for part in pose.quaternion_ned_frd)
-        if not all(map(isfinite, numbers)) or not 0.98 < length_sq < 1.02:
+        """Keep a pose; False when it cannot be or is not newer than the last."""
+        if not (pose.has_position and pose.has_height and pose.has_attitude):
             return False
         if self._stamps and pose.stamp_ns <= self._stamps[-1]:
             return False

@@ -17,10 +17,7 @@ _AT_ALTITUDE = 0.98
 def valid_pose(telemetry: Telemetry | None, parameters: LandingParameters) -> Pose | None:
     """Return the pose of telemetry when it is valid, else None."""
     pose = None if telemetry is None else telemetry.pose
-    if pose is None:
-        return None
-    numbers = (pose.north_m, pose.east_m, pose.altitude_agl_m)
-    if not all(isfinite(number) for number in numbers):
+    if pose is None or not pose.has_position:
         return None
     return pose if 0.0 < pose.altitude_agl_m <= parameters.altitude_limit_m else None
 
@@ -71,8 +68,9 @@ def bad_vehicle(telemetry: Telemetry | None, age_s: float, parameters: LandingPa
     pose = telemetry.pose
     if valid_pose(telemetry, p) is None:
         return (
-            f'position {pose.north_m:.1f}, {pose.east_m:.1f} m at {pose.altitude_agl_m:.1f} m '
-            f'above ground is not valid: altitude must lie within 0 to {p.altitude_limit_m:.0f} m'
+            f'position {pose.north_m:.6g}, {pose.east_m:.6g} m at {pose.altitude_agl_m:.6g} m '
+            f'above ground is not valid: altitude must lie within 0 to {p.altitude_limit_m:.0f} m, '
+            'position within 1000 km'
         )
     return ''
 

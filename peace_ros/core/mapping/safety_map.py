@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from peace_ros.core.domain import Camera, DepthImage, Heatmap, ImageError, Pose
 from peace_ros.core.domain.errors import VehicleError
+from peace_ros.core.domain.motion import FARTHEST_M
 from peace_ros.core.mapping.flatness import rough_and_flat
 from peace_ros.core.mapping.layers import MapLayers, shifted
 from peace_ros.core.mapping.parameters import MapParameters
@@ -157,11 +158,12 @@ class SafetyMap:
 
     def _check_pose(self, pose: Pose) -> None:
         numbers = (pose.north_m, pose.east_m, pose.altitude_agl_m, *pose.quaternion_ned_frd)
-        if not np.all(np.isfinite(numbers)) or pose.altitude_agl_m < LOWEST_LOOK_M:
+        whole = pose.has_position and pose.has_height and pose.has_attitude
+        if not whole or pose.altitude_agl_m < LOWEST_LOOK_M:
             raise RefusedLookError(
-                'taken too low above ground',
-                f'pose {numbers}: must be finite and {LOWEST_LOOK_M} m or more above ground to '
-                'project a picture',
+                'taken too low above ground' if whole else 'taken at an impossible place',
+                f'pose {numbers}: must be numbers within {FARTHEST_M:g} m of the origin, with a '
+                f'unit quaternion, {LOWEST_LOOK_M} m or more above ground to project a picture',
             )
         tilt_deg, limit_deg = degrees(tilt_rad(pose)), self.parameters.tilt_limit_deg
         if tilt_deg > limit_deg:

@@ -6,7 +6,7 @@ from peace_ros.core.vehicle.dialects import AUTO, ArduPilot, Dialect, Px4, regis
 from peace_ros.core.vehicle.link import VehicleLink, check_access, open_vehicle
 from peace_ros.core.vehicle.mavlink import MavlinkLink
 from peace_ros.core.vehicle.parameters import SenderParameters, VehicleParameters
-from peace_ros.core.vehicle.result import Answer, RequestResult
+from peace_ros.core.vehicle.result import Answer, LineCounts, RequestResult
 from peace_ros.core.vehicle.sender import SenderState, SenderStatistics, SetpointSender
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     'Answer',
     'ArduPilot',
     'Dialect',
+    'LineCounts',
     'MavlinkLink',
     'Px4',
     'RequestResult',

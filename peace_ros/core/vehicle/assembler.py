@@ -6,37 +6,47 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from math import isfinite, nan, sqrt
+from math import nan, sqrt
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain.geometry import Quaternion, quaternion_from_euler, yaw_from_quaternion
 from peace_ros.core.domain.motion import Pose, Telemetry
+from peace_ros.core.vehicle.boots import BootClock, Moment
 from peace_ros.core.vehicle.clock import TimeMap
 from peace_ros.core.vehicle.dialects import Dialect
+from peace_ros.core.vehicle.gnss import GnssWatch
 from peace_ros.core.vehicle.heights import MAX_EXTRAPOLATION_S, Height, HomeHeight, height_of
 from peace_ros.core.vehicle.parameters import VehicleParameters
 from peace_ros.core.vehicle.texts import StatusTexts
-from peace_ros.core.vehicle.trust import JumpWatch, PoseReport
+from peace_ros.core.vehicle.trust import JumpWatch, Pairwise, PoseReport
 
 RANGE_LIMIT_S = 0.5
-REBOOT_MS = 1000
-"""A boot time that goes back by more than this is a reboot."""
 MAX_POSES = 256
 ESTIMATOR_LIMIT_S = 3.0
 """Age at which the report of the position filter about itself is stale."""
 KNOWS_POSITION = mavlink.ESTIMATOR_POS_HORIZ_REL | mavlink.ESTIMATOR_POS_HORIZ_ABS
+GLOBAL_POSITION = mavlink.ESTIMATOR_POS_HORIZ_ABS
 GUESSES_POSITION = mavlink.ESTIMATOR_CONST_POS_MODE
-IN_ORDER = frozenset({'LOCAL_POSITION_NED', 'ATTITUDE', 'ATTITUDE_QUATERNION'})
+"""PX4 sets it for a vehicle at rest too, beside the bit of a global position, which it then has."""
+IN_ORDER = frozenset(
+    {'LOCAL_POSITION_NED', 'ATTITUDE', 'ATTITUDE_QUATERNION', 'GLOBAL_POSITION_INT'}
+)
 """Of these only the newest is used, in whatever order they are received."""
-NUMBERS = {
-    'LOCAL_POSITION_NED': ('x', 'y', 'z', 'vx', 'vy', 'vz'),
-    'ATTITUDE': ('roll', 'pitch', 'yaw'),
-    'ATTITUDE_QUATERNION': ('q1', 'q2', 'q3', 'q4'),
-    'HOME_POSITION': ('z',),
+FARTHEST_M, HIGHEST_MM, FASTEST_M_S, TURN_RAD = 1e6, 2e7, 100.0, 7.0
+LIMITS: dict[str, tuple[tuple[str, float], ...]] = {
+    'LOCAL_POSITION_NED': (
+        *((axis, FARTHEST_M) for axis in 'xyz'),
+        *((f'v{axis}', FASTEST_M_S) for axis in 'xyz'),
+    ),
+    'ATTITUDE': tuple((angle, TURN_RAD) for angle in ('roll', 'pitch', 'yaw')),
+    'ATTITUDE_QUATERNION': tuple((f'q{i}', 1.1) for i in range(1, 5)),
+    'HOME_POSITION': (('z', FARTHEST_M), ('altitude', HIGHEST_MM)),
+    'GPS_GLOBAL_ORIGIN': (('altitude', HIGHEST_MM),),
+    'GLOBAL_POSITION_INT': (('relative_alt', HIGHEST_MM),),
 }
-"""Fields that must be numbers."""
+"""Fields that must be numbers, and the largest size of each that a multicopter can reach."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +83,13 @@ class Assembler:
         self.landed_state = 0
         """MAV_LANDED_STATE; 0 while it is not known."""
         self._received_ns = 0
+        self._absurd = ''
+        """Why the newest position was rejected, empty when it was not."""
         self._battery: float | None = None
         self._mode = ''
         self._armed = False
         self._heartbeat_ns: int | None = None
+        self._boots = BootClock()
         self._forget()
 
     def _forget(self) -> None:
@@ -87,10 +100,13 @@ class Assembler:
         self._yaw_rad = 0.0
         self._home = HomeHeight(is_local=self._dialect.home_is_local)
         self._height: Height | None = None
+        self._heights = Pairwise(self._parameters.jump_limit_m)
         self._range: tuple[int, float] | None = None
-        self._boot_ms = 0
+        self._ranges = Pairwise(self._parameters.jump_limit_m)
         self._newest_boot_ms: dict[str, int] = {}
-        self._estimator: tuple[int, int] | None = None
+        self._estimator: tuple[int, int, int] | None = None
+        """Steady clock, flags, flags of the report before."""
+        self._gnss = GnssWatch()
         self.landed_state = 0
         self.arrived_ns.clear()
         self._watch.forget()
@@ -109,16 +125,16 @@ class Assembler:
         handler = _HANDLERS.get(kind)
         if handler is None:
             return
-        boot_ms = getattr(message, 'time_boot_ms', None)
-        if boot_ms is not None:
-            self._watch_boot(boot_ms)
-        if not _is_sane(kind, message):
+        absurd = _absurd(kind, message)
+        if kind == 'LOCAL_POSITION_NED':
+            self._absurd = absurd
+        if absurd:
             self.rejected += 1
-        elif kind in IN_ORDER and self._is_late(kind, message.time_boot_ms):
+        elif self._is_late(kind, getattr(message, 'time_boot_ms', None), steady_ns):
             self.late += 1
         else:
-            handler(self, message, stamp_ns, steady_ns)
             self.arrived_ns[message.get_msgId()] = steady_ns
+            handler(self, message, stamp_ns, steady_ns)
 
     @property
     def mode(self) -> str:
@@ -154,12 +170,12 @@ class Assembler:
     def position_problem(self, steady_ns: int) -> str:
         """Return why there is no position to fly by, empty when nothing speaks against it."""
         flags = self._estimator_flags(steady_ns)
-        if flags is not None and (not flags & KNOWS_POSITION or flags & GUESSES_POSITION):
+        if flags is not None and not _has_position(flags):
             return (
                 f'the autopilot has no estimate of its position (filter flags 0x{flags:X}) and '
                 'refuses velocity set-points: it needs GNSS, external navigation or optical flow'
             )
-        return self._watch.problem
+        return self._absurd or self._gnss.problem or self._watch.problem
 
     def telemetry(self, steady_ns: int) -> Telemetry:
         """Return what is known now; a pose that is too old or rejected is None."""
@@ -191,24 +207,37 @@ class Assembler:
         limit_s, age_s = self._parameters.heartbeat_limit_s, self.heartbeat_age_s(steady_ns)
         if problem or self._heartbeat_ns is None or age_s <= limit_s:
             return problem
-        return f'HEARTBEAT is {age_s:.1f} s old, limit {limit_s:g} s: it is unknown who controls it'
+        return f'no HEARTBEAT for more than {limit_s:g} s: it is unknown who controls the vehicle'
 
     def _estimator_flags(self, steady_ns: int) -> int | None:
-        if self._estimator is None:
+        """Return the flags; a position that came back counts from the second report on."""
+        if self._estimator is None or steady_ns - self._estimator[0] > ESTIMATOR_LIMIT_S * 1e9:
             return None
-        seen_ns, flags = self._estimator
-        return flags if steady_ns - seen_ns <= ESTIMATOR_LIMIT_S * 1e9 else None
+        _, flags, before = self._estimator
+        return flags if not _has_position(flags) else before
 
-    def _watch_boot(self, boot_ms: int) -> None:
-        if boot_ms + REBOOT_MS < self._boot_ms:
+    def _is_late(self, kind: str, boot_ms: int | None, steady_ns: int) -> bool:
+        if boot_ms is None:
+            return False
+        before_ms = self._boots.newest_ms
+        moment = self._boots.judge(boot_ms, steady_ns, self._heartbeat_ns)
+        if moment is Moment.DOUBTFUL:
+            return True
+        if moment is Moment.REBOOTED:
             self.reboots += 1
             self._forget()
-        self._boot_ms = max(self._boot_ms, boot_ms)
-
-    def _is_late(self, kind: str, boot_ms: int) -> bool:
+        elif moment is Moment.STEPPED:
+            self._follow_clock(boot_ms - before_ms)
         newest_ms = self._newest_boot_ms.get(kind, -1)
         self._newest_boot_ms[kind] = max(newest_ms, boot_ms)
-        return boot_ms <= newest_ms
+        return kind in IN_ORDER and boot_ms <= newest_ms
+
+    def _follow_clock(self, by_ms: int) -> None:
+        """Follow a clock that was set: what guards height and position stays."""
+        self._position = self._height = None
+        self._newest_boot_ms.clear()
+        self._clock.forget()
+        self._watch.shift(by_ms)
 
     def _heartbeat(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
         self._mode = self._dialect.mode_name(m.custom_mode)
@@ -288,18 +317,27 @@ class Assembler:
         if m.orientation != mavlink.MAV_SENSOR_ROTATION_PITCH_270:
             return
         in_range = m.min_distance < m.current_distance < m.max_distance
-        self._range = (steady_ns, m.current_distance / 100.0) if in_range else None
+        distance_m = m.current_distance / 100.0
+        if self._ranges.believes(distance_m):
+            self._range = (steady_ns, distance_m) if in_range else None
 
     def _take_home(self, m: Any, _stamp_ns: int, _steady_ns: int) -> None:
-        believed = self._home.take_home(m.altitude / 1e3, m.z, flying=self._is_flying)
-        self.rejected += not believed
+        if not self._home.take_home(m.altitude / 1e3, m.z, flying=self._is_flying):
+            self._doubt_home(m)
 
     def _take_origin(self, m: Any, _stamp_ns: int, _steady_ns: int) -> None:
-        believed = self._home.take_origin(m.altitude / 1e3, flying=self._is_flying)
-        self.rejected += not believed
+        if not self._home.take_origin(m.altitude / 1e3, flying=self._is_flying):
+            self._doubt_home(m)
+
+    def _doubt_home(self, m: Any) -> None:
+        self.rejected += 1
+        if not self._is_flying:
+            self.arrived_ns.pop(m.get_msgId(), None)  # it is asked for again
 
     def _take_height(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
-        self._height = height_of(m, steady_ns)
+        height = height_of(m, steady_ns)
+        if height is None or self._heights.believes(height.above_home_m):
+            self._height = height
 
     @property
     def _is_flying(self) -> bool:
@@ -313,7 +351,14 @@ class Assembler:
         self._battery = m.battery_remaining / 100.0 if 0 <= m.battery_remaining <= 100 else None
 
     def _estimate(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
-        self._estimator = (steady_ns, int(m.flags))
+        flags = int(m.flags)
+        before = flags if self._estimator is None else self._estimator[1]
+        self._estimator = (steady_ns, flags, before)
+
+    def _take_fix(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
+        flags = self._estimator_flags(steady_ns)
+        known = None if flags is None else _has_position(flags)
+        self._gnss.take(m.get_type(), m.fix_type, self._boots.newest_ms, known=known)
 
     def _text(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
         self.texts.take(m, steady_ns)
@@ -323,10 +368,20 @@ def _size(m: Any) -> float:
     return sqrt(m.q1 * m.q1 + m.q2 * m.q2 + m.q3 * m.q3 + m.q4 * m.q4)
 
 
-def _is_sane(kind: str, message: Any) -> bool:
-    if not all(isfinite(getattr(message, name)) for name in NUMBERS.get(kind, ())):
-        return False
-    return kind != 'ATTITUDE_QUATERNION' or 0.9 < _size(message) < 1.1
+def _has_position(flags: int) -> bool:
+    guesses = flags & GUESSES_POSITION and not flags & GLOBAL_POSITION
+    return bool(flags & KNOWS_POSITION) and not guesses
+
+
+def _absurd(kind: str, message: Any) -> str:
+    """Return which value cannot be believed, empty when all can."""
+    for name, limit in LIMITS.get(kind, ()):
+        value = getattr(message, name)
+        if not abs(value) <= limit:  # also NaN
+            return f'{kind} has {name} = {value:g}, limit {limit:g}: the message is rejected'
+    if kind == 'ATTITUDE_QUATERNION' and not 0.9 < _size(message) < 1.1:
+        return f'{kind} of size {_size(message):g}: must be 1'
+    return ''
 
 
 _HANDLERS = {
@@ -341,6 +396,8 @@ _HANDLERS = {
     'ALTITUDE': Assembler._take_height,  # noqa: SLF001
     'EXTENDED_SYS_STATE': Assembler._landed,  # noqa: SLF001
     'SYS_STATUS': Assembler._health,  # noqa: SLF001
+    'GPS_RAW_INT': Assembler._take_fix,  # noqa: SLF001
+    'GPS2_RAW': Assembler._take_fix,  # noqa: SLF001
     'EKF_STATUS_REPORT': Assembler._estimate,  # noqa: SLF001
     'ESTIMATOR_STATUS': Assembler._estimate,  # noqa: SLF001
     'STATUSTEXT': Assembler._text,  # noqa: SLF001

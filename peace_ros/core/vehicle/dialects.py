@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2, cos, hypot, sin
-from typing import Any, Protocol
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -27,100 +28,52 @@ ModeCommand = Vector
 """The first three parameters of MAV_CMD_DO_SET_MODE."""
 
 
-class Dialect(Protocol):
+@dataclass(frozen=True)
+class Dialect(ABC):
     """The modes and messages of one kind of autopilot."""
 
-    @property
-    def name(self) -> str:
-        """What a user calls it."""
-        ...
+    hold_mode: str
+    """The autopilot's own mode for holding position."""
+    name: str
+    """What a user calls it."""
+    autopilot: int
+    """MAV_AUTOPILOT in HEARTBEAT."""
+    control_mode: str
+    """Mode that obeys set-points."""
+    land_mode: str
+    """The autopilot's own mode for landing where it is."""
+    estimator_message: int
+    """Message id that tells what its position filter knows."""
+    height_message: int
+    """Message id of a height above home that needs no position."""
+    streams_before_control: bool = False
+    """Set-points must flow before the mode that obeys them is entered."""
+    level_mode: str = ''
+    """Mode in which it keeps its height, level, without a position; empty: it has none."""
+    home_is_local: bool = False
+    """HOME_POSITION tells where home is in the local frame, not only on the globe."""
+    heartbeat_rate_hz: float = 0.0
+    """Rate of HEARTBEAT to ask for; 0: a new mode is told at once anyway."""
 
-    @property
-    def autopilot(self) -> int:
-        """MAV_AUTOPILOT in HEARTBEAT."""
-        ...
-
-    @property
-    def streams_before_control(self) -> bool:
-        """Set-points must flow before the mode that obeys them is entered."""
-        ...
-
-    @property
-    def control_mode(self) -> str:
-        """Name of the mode that obeys set-points."""
-        ...
-
-    @property
-    def hold_mode(self) -> str:
-        """Name of the autopilot's own mode for holding position."""
-        ...
-
-    @property
-    def land_mode(self) -> str:
-        """Name of the autopilot's own mode for landing where it is."""
-        ...
-
-    @property
-    def level_mode(self) -> str:
-        """Mode in which it keeps its height, level, without a position; empty: it has none."""
-        ...
-
-    @property
-    def estimator_message(self) -> int:
-        """Message id that tells what its position filter knows."""
-        ...
-
-    @property
-    def height_message(self) -> int:
-        """Message id of a height above home that needs no position."""
-        ...
-
-    @property
-    def home_is_local(self) -> bool:
-        """HOME_POSITION tells where home is in the local frame, not only on the globe."""
-        ...
-
-    @property
-    def heartbeat_rate_hz(self) -> float:
-        """Rate of HEARTBEAT to ask for; 0: a new mode is told at once anyway."""
-        ...
-
+    @abstractmethod
     def mode_name(self, custom_mode: int) -> str:
         """Return the autopilot's own name of a mode."""
-        ...
 
+    @abstractmethod
     def mode_command(self, mode: str) -> ModeCommand:
         """Return the parameters of MAV_CMD_DO_SET_MODE; VehicleError for an unknown mode."""
-        ...
 
-    def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
-        """Return the set-point as a message to (system, component)."""
-        ...
-
+    @abstractmethod
     def landing_target_message(self, site_ned_m: Vector, pose: Pose, stamp_us: int) -> Any:
         """Return LANDING_TARGET for a point on the ground, local NED, in a frame it takes."""
-        ...
 
-
-def _velocity_message(setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
-    return mavlink.MAVLink_set_position_target_local_ned_message(
-        boot_ms & 0xFFFFFFFF,
-        target[0],
-        target[1],
-        mavlink.MAV_FRAME_LOCAL_NED,
-        VELOCITY_HOLD_HEADING,
-        0.0,
-        0.0,
-        0.0,
-        setpoint.v_north_m_s,
-        setpoint.v_east_m_s,
-        setpoint.v_down_m_s,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )
+    def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
+        """Return SET_POSITION_TARGET_LOCAL_NED to (system, component), heading held."""
+        v = (setpoint.v_north_m_s, setpoint.v_east_m_s, setpoint.v_down_m_s)
+        frame, mask, place = mavlink.MAV_FRAME_LOCAL_NED, VELOCITY_HOLD_HEADING, (0.0,) * 3
+        return mavlink.MAVLink_set_position_target_local_ned_message(
+            boot_ms & 0xFFFFFFFF, *target, frame, mask, *place, *v, *(0.0,) * 5
+        )
 
 
 LEVEL_HOLDS_HEIGHT = 0.5
@@ -131,46 +84,26 @@ ONLY_ATTITUDE = 0x07
 
 def level_message(yaw_rad: float, boot_ms: int, target: tuple[int, int]) -> Any:
     """Return SET_ATTITUDE_TARGET: level, heading as given, neither climbing nor descending."""
+    q = [cos(yaw_rad / 2.0), 0.0, 0.0, sin(yaw_rad / 2.0)]
     return mavlink.MAVLink_set_attitude_target_message(
-        boot_ms & 0xFFFFFFFF,
-        target[0],
-        target[1],
-        ONLY_ATTITUDE,
-        [cos(yaw_rad / 2.0), 0.0, 0.0, sin(yaw_rad / 2.0)],
-        0.0,
-        0.0,
-        0.0,
-        LEVEL_HOLDS_HEIGHT,
+        boot_ms & 0xFFFFFFFF, *target, ONLY_ATTITUDE, q, 0.0, 0.0, 0.0, LEVEL_HOLDS_HEIGHT
     )
 
 
 def _from_body(site_ned_m: Vector, pose: Pose) -> Vector:
     """Return the way from the vehicle to a point: forward, right, down."""
-    away = (
-        site_ned_m[0] - pose.north_m,
-        site_ned_m[1] - pose.east_m,
-        site_ned_m[2] - pose.down_m,
-    )
-    body = rotation_matrix(pose.quaternion_ned_frd).T @ away
-    return float(body[0]), float(body[1]), float(body[2])
+    here = (pose.north_m, pose.east_m, pose.down_m)
+    away = [there - own for there, own in zip(site_ned_m, here, strict=True)]
+    forward, right, down = rotation_matrix(pose.quaternion_ned_frd).T @ away
+    return float(forward), float(right), float(down)
 
 
 def _landing_target(frame: int, vector: Vector, body_m: Vector, stamp_us: int) -> Any:
-    distance_m = max(0.01, hypot(*body_m))
     forward, right, down = body_m
+    where = (atan2(right, down), atan2(-forward, down), max(0.01, hypot(*body_m)))
+    level, kind = [1.0, 0.0, 0.0, 0.0], mavlink.LANDING_TARGET_TYPE_VISION_OTHER
     return mavlink.MAVLink_landing_target_message(
-        stamp_us,
-        0,
-        frame,
-        atan2(right, down),
-        atan2(-forward, down),
-        distance_m,
-        0.0,
-        0.0,
-        *vector,
-        [1.0, 0.0, 0.0, 0.0],
-        mavlink.LANDING_TARGET_TYPE_VISION_OTHER,
-        1,
+        stamp_us, 0, frame, *where, 0.0, 0.0, *vector, level, kind, 1
     )
 
 
@@ -187,20 +120,17 @@ _ARDUCOPTER_NAMES = {number: name for name, number in ARDUCOPTER_MODES.items()}
 
 
 @dataclass(frozen=True)
-class ArduPilot:
+class ArduPilot(Dialect):
     """ArduCopter: GUIDED obeys set-points (ArduPilot documentation, Copter commands in GUIDED)."""
 
     hold_mode: str = 'BRAKE'
     name: str = 'ardupilot'
     autopilot: int = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
-    streams_before_control: bool = False
     control_mode: str = 'GUIDED'
     land_mode: str = 'LAND'
     level_mode: str = 'GUIDED_NOGPS'
     estimator_message: int = 193
     height_message: int = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
-    home_is_local: bool = False
-    heartbeat_rate_hz: float = 0.0
 
     def mode_name(self, custom_mode: int) -> str:
         """Return e.g. GUIDED; MODE 99 for one that is not known."""
@@ -211,10 +141,6 @@ class ArduPilot:
         if mode not in ARDUCOPTER_MODES:
             raise _unknown_mode(mode, list(ARDUCOPTER_MODES))
         return float(CUSTOM_MODE), float(ARDUCOPTER_MODES[mode]), 0.0
-
-    def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
-        """Return SET_POSITION_TARGET_LOCAL_NED, frame LOCAL_NED, heading held."""
-        return _velocity_message(setpoint, boot_ms, target)
 
     def landing_target_message(self, site_ned_m: Vector, pose: Pose, stamp_us: int) -> Any:
         """Return LANDING_TARGET in BODY_FRD, the frame of its precision landing."""
@@ -241,7 +167,7 @@ _PX4_NAMES = {numbers: name for name, numbers in PX4_MODES.items()}
 
 
 @dataclass(frozen=True)
-class Px4:
+class Px4(Dialect):
     """PX4: OFFBOARD, entered only while set-points flow at 2 Hz or more."""
 
     name: str = 'px4'
@@ -250,7 +176,6 @@ class Px4:
     control_mode: str = 'OFFBOARD'
     hold_mode: str = 'AUTO.LOITER'
     land_mode: str = 'AUTO.LAND'
-    level_mode: str = ''
     estimator_message: int = 230
     height_message: int = mavlink.MAVLINK_MSG_ID_ALTITUDE
     home_is_local: bool = True
@@ -267,10 +192,6 @@ class Px4:
             raise _unknown_mode(mode, list(PX4_MODES))
         main, sub = PX4_MODES[mode]
         return float(CUSTOM_MODE), float(main), float(sub)
-
-    def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
-        """Return SET_POSITION_TARGET_LOCAL_NED, frame LOCAL_NED, heading held."""
-        return _velocity_message(setpoint, boot_ms, target)
 
     def landing_target_message(self, site_ned_m: Vector, pose: Pose, stamp_us: int) -> Any:
         """Return LANDING_TARGET in LOCAL_NED, the only frame that it takes."""

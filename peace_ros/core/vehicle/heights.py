@@ -16,6 +16,8 @@ MAX_EXTRAPOLATION_S = 0.3
 class HomeHeight:
     """Height of home in the local frame, whose origin may lie at another height.
 
+    A height that changes in flight is rejected; on the ground it needs two reports that agree.
+
     Args:
         is_local: HOME_POSITION tells it itself. ArduPilot fills in zeros there; what it says is
             the altitude of home above the sea, and in GPS_GLOBAL_ORIGIN that of the origin.
@@ -25,17 +27,18 @@ class HomeHeight:
         self._is_local = is_local
         self._origin_msl_m: float | None = None
         self._told_m: float | None = None
+        self._moved_to_m: float | None = None
         self.home_msl_m: float | None = None
         """Altitude of home above sea level."""
         self.down_m: float | None = None
         """Home below the origin; None until it is known."""
 
     def take_home(self, msl_m: float, down_m: float, *, flying: bool) -> bool:
-        """Take HOME_POSITION; False when it moved in flight and is rejected."""
+        """Take HOME_POSITION; False when it is rejected: see the class."""
         return self._take(msl_m, self._origin_msl_m, down_m, flying=flying)
 
     def take_origin(self, msl_m: float, *, flying: bool) -> bool:
-        """Take GPS_GLOBAL_ORIGIN; False when it moved in flight and is rejected."""
+        """Take GPS_GLOBAL_ORIGIN; False when it is rejected: see the class."""
         return self._take(self.home_msl_m, msl_m, self._told_m, flying=flying)
 
     def _take(
@@ -48,8 +51,10 @@ class HomeHeight:
         # The first report of the origin does not mean that home moved.
         learns = not self._is_local and self._origin_msl_m is None and origin_m is not None
         moves = known_m is not None and down_m is not None and abs(down_m - known_m) > HOME_STEP_M
-        if flying and moves and not learns:
-            return False
+        if down_m is not None and moves and not learns:
+            before_m, self._moved_to_m = self._moved_to_m, down_m
+            if flying or before_m is None or abs(down_m - before_m) > HOME_STEP_M:
+                return False
         self.home_msl_m, self._origin_msl_m, self._told_m = home_m, origin_m, told_m
         self.down_m = down_m
         return True

@@ -50,22 +50,14 @@ class Housekeeping:
         if now_ns < self._heartbeat_due_ns:
             return None
         self._heartbeat_due_ns = now_ns + HEARTBEAT_NS
-        return mavlink.MAVLink_heartbeat_message(
-            mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-            mavlink.MAV_AUTOPILOT_INVALID,
-            0,
-            0,
-            self._health,
-            3,
-        )
+        who = (mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID)
+        return mavlink.MAVLink_heartbeat_message(*who, 0, 0, self._health, 3)
 
     def requests(self, now_ns: int, assembler: Assembler, target: tuple[int, int]) -> list[Any]:
         """Return what to ask the autopilot for now."""
         due = [] if self.streams is None else self.streams.due(assembler, now_ns)
         messages: list[Any] = [
-            mavlink.MAVLink_command_long_message(
-                *target, command, 0, *params, 0.0, 0.0, 0.0, 0.0, 0.0
-            )
+            mavlink.MAVLink_command_long_message(*target, command, 0, *params, *(0.0,) * 5)
             for command, params in due
         ]
         if self._answer is not None:

@@ -26,7 +26,7 @@ from peace_ros.core.vehicle.obedience import ObedienceWatch
 from peace_ros.core.vehicle.parameters import VehicleParameters
 from peace_ros.core.vehicle.peer import Peer
 from peace_ros.core.vehicle.requests import Requests
-from peace_ros.core.vehicle.result import Answer, RequestResult
+from peace_ros.core.vehicle.result import Answer, LineCounts, RequestResult
 from peace_ros.core.vehicle.signing import Signer
 from peace_ros.core.vehicle.streams import StreamKeeper
 from peace_ros.core.vehicle.transport import Source
@@ -119,8 +119,7 @@ class MavlinkLink:
             age_s = self._heard().heartbeat_age_s(time.monotonic_ns())
         if age_s <= limit_s:
             return ''
-        age = f'{age_s:.0f} s, limit {limit_s} s'
-        return f'no HEARTBEAT of the autopilot for {age}: check its power and the line'
+        return f'no HEARTBEAT for more than {limit_s:g} s: check the autopilot and the line'
 
     @property
     def position_problem(self) -> str:
@@ -130,31 +129,16 @@ class MavlinkLink:
             return found or self._obedience.problem
 
     @property
-    def ignored(self) -> int:
-        """Messages of other systems than the chosen autopilot."""
-        return self._peer.ignored
+    def warning(self) -> str:
+        """What a person should know of the line, empty when nothing."""
+        return '; '.join(each for each in (self._peer.warning, self._wire.warning) if each)
 
     @property
-    def unsigned(self) -> int:
-        """Messages that were refused for their signature."""
-        return self._wire.refused
-
-    @property
-    def rejected(self) -> int:
-        """Messages of the autopilot that were rejected: values that are not numbers."""
+    def counts(self) -> LineCounts:
+        """Messages that were not used, since the line was opened."""
         with self._changed:
-            return self._heard().rejected
-
-    @property
-    def late(self) -> int:
-        """Messages that were received twice or out of order, and dropped."""
-        with self._changed:
-            return self._heard().late
-
-    @property
-    def clock(self) -> TimeMap:
-        """The map from the autopilot's clock to ours, for inspection."""
-        return self._clock
+            heard = self._heard()
+            return LineCounts(self._peer.ignored, *self._wire.refused, heard.rejected, heard.late)
 
     @property
     def landed_state(self) -> int:
@@ -347,7 +331,8 @@ class MavlinkLink:
                 return
             error = self._error
         self.close()
-        refused = f', {self._wire.refused} not rightly signed' if self._wire.refused else ''
+        count = sum(self._wire.refused)
+        refused = f', {count} not rightly signed' if count else ''
         served = ''
         if not self._transport.datagrams and not self._bytes_heard:
             served = '; a TCP port of a simulation serves one client: is another connected'

@@ -35,6 +35,8 @@ class Peer:
         self.source: Source = None
         self.ignored = 0
         """Messages of others."""
+        self.warning = ''
+        """Who else speaks in the autopilot's name, empty when nobody does."""
         self.others: set[tuple[int, int]] = set()
         """Autopilots that were heard and not taken."""
 
@@ -61,16 +63,24 @@ class Peer:
     def is_ours(self, message: Any, source: Source, now_ns: int) -> bool:
         """Tell whether a message comes from the chosen autopilot; follows it to a new address."""
         who = (message.get_srcSystem(), message.get_srcComponent())
-        moved = source != self.source
-        if (
-            not self._known
-            or who != self.target
-            or (moved and now_ns - self._heard_ns < NEW_ADDRESS_NS)
-        ):
+        is_target = self._known and who == self.target
+        follows = now_ns - self._heard_ns >= NEW_ADDRESS_NS
+        elsewhere = is_target and source != self.source
+        if elsewhere:
+            self._warn(source, follows=follows)
+        if not is_target or (elsewhere and not follows):
             self.ignored += 1
             return False
         self.source, self._heard_ns = source, now_ns
         return True
+
+    def _warn(self, source: Source, *, follows: bool) -> None:
+        old, new = (':'.join(map(str, each or ('?',))) for each in (self.source, source))
+        result = f'{new} is followed after 3 s of silence' if follows else f'{new} is ignored'
+        self.warning = (
+            f'system {self.target[0]}, component {self.target[1]} speaks from two addresses, '
+            f'{old} and {new}: {result}; end one of them, or sign the messages'
+        )
 
     def heard_instead(self) -> str:
         """Return who else was heard, as part of a sentence; empty when nobody was."""

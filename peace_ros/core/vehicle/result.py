@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The result of a request to the autopilot."""
+"""The result of a request to the autopilot, and the counts of what was not used."""
 
 from __future__ import annotations
 
@@ -28,3 +28,19 @@ class RequestResult:
 
     def __bool__(self) -> bool:
         return self.answer is Answer.ACCEPTED
+
+
+@dataclass(frozen=True)
+class LineCounts:
+    """Messages that were not used."""
+
+    ignored: int = 0
+    """Of other systems than the chosen autopilot, or from another address."""
+    unsigned: int = 0
+    """Without a signature."""
+    forged: int = 0
+    """Signed with another key, damaged, or with a time stamp that was used before."""
+    rejected: int = 0
+    """Of the autopilot, with values that are not numbers or cannot be."""
+    late: int = 0
+    """Of the autopilot, received twice or out of order."""

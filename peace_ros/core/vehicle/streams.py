@@ -17,6 +17,10 @@ ONCE_AGAIN_NS = 3_000_000_000
 HEALTH_HZ = 1.0
 HEIGHT_HZ = 10.0
 ESTIMATOR_HZ = 4.0
+FIX_HZ = 10.0
+"""A descent by GNSS has to stop within 1 s of a lost fix."""
+MAYBE = frozenset({mavlink.MAVLINK_MSG_ID_GPS2_RAW})
+"""Asked for once: not every vehicle has it."""
 
 Request = tuple[int, tuple[float, float]]
 """MAV_CMD and its first two parameters."""
@@ -33,6 +37,8 @@ class StreamKeeper:
             mavlink.MAVLINK_MSG_ID_SYS_STATUS: HEALTH_HZ,
             dialect.estimator_message: ESTIMATOR_HZ,
             dialect.height_message: HEIGHT_HZ,
+            mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: FIX_HZ,
+            mavlink.MAVLINK_MSG_ID_GPS2_RAW: FIX_HZ,
         }
         if dialect.heartbeat_rate_hz > 0.0:
             self._rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
@@ -53,7 +59,7 @@ class StreamKeeper:
         for message_id, rate_hz in self._rates_hz.items():
             limit_ns = max(SILENT_NS, round(3e9 / rate_hz))
             silent = now_ns - assembler.arrived_ns.get(message_id, 0) > limit_ns
-            if message_id not in self._asked_ns or silent:
+            if message_id not in self._asked_ns or (silent and message_id not in MAYBE):
                 request = (
                     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
                     (float(message_id), 1e6 / rate_hz),

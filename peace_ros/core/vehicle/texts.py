@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""STATUSTEXT, long ones put together from their chunks."""
+"""STATUSTEXT, long ones put together from their chunks, cleaned of what moves a terminal."""
 
 from __future__ import annotations
 
@@ -39,4 +39,9 @@ class StatusTexts:
                 self._chunks[message.id] = whole
                 return
             text = whole
-        self.entries.append((steady_ns, text))
+        self.entries.append((steady_ns, printable(text)))
+
+
+def printable(text: str) -> str:
+    """Return a text in which control and invisible characters became '?': one line, no escapes."""
+    return ''.join(each if each.isprintable() else '?' for each in text)

@@ -31,15 +31,12 @@ class Transport(Protocol):
 
     def read(self, timeout_s: float) -> list[Chunk]:
         """Return what arrives within the time, or nothing; VehicleError when the line broke."""
-        ...
 
     def write(self, data: bytes, to: Source, /) -> None:
         """Send; VehicleError when the line broke."""
-        ...
 
     def close(self) -> None:
         """Release the line."""
-        ...
 
 
 class _Udp:

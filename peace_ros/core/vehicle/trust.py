@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import dist, hypot
 
 Vector = tuple[float, float, float]
@@ -15,6 +15,7 @@ GAP_S = 1.0
 """Reports farther apart are compared by the fastest speed only."""
 SETTLED_S = 2.0
 """Reports that agree with each other for so long are believed again, when somebody else flies."""
+FASTEST_CHANGE_M_S2 = 20.0
 RESET_S = 15.0
 """The same while we fly and stand still, when the height has stayed as it was."""
 SAME_HEIGHT_M = 2.0
@@ -32,6 +33,8 @@ class PoseReport:
 class JumpWatch:
     """Compares each position with where the one before it led.
 
+    Neither the position nor the velocity of a single message moves what is believed by more than
+    the limit: what lies farther off and is possible needs a second report that agrees with it.
     A jump is a reset of the position filter or a fault; in both cases the map is no longer valid.
     While we have control the vehicle stands until the position comes back to where it was, or has
     been steady at the old height for fifteen seconds: GNSS that returns moves the position for
@@ -58,6 +61,14 @@ class JumpWatch:
         self._height_jumped_m = 0.0
         self.problem = ''
 
+    def shift(self, by_ms: int) -> None:
+        """Follow a clock of the autopilot that was set; places stay."""
+        self._steady_since_ms += by_ms
+        self._believed, self._newest = (
+            each and replace(each, boot_ms=each.boot_ms + by_ms)
+            for each in (self._believed, self._newest)
+        )
+
     def believes(self, report: PoseReport, *, in_control: bool) -> bool:
         """Take a report; tell whether it may be used."""
         newest, self._newest = self._newest, report
@@ -72,9 +83,9 @@ class JumpWatch:
             if back or self._has_settled(report, in_control=in_control):
                 return self._believe(report)
             return False
-        excess_m = self._deviation_m(self._believed, report)
-        if excess_m <= 0.0:
-            return self._believe(report)
+        if self._deviation_m(self._believed, report) <= 0.0:
+            near = any(each and self._is_near(each, report) for each in (self._believed, newest))
+            return near and self._believe(report)
         jump_m = dist(report.position_m, self._believed.position_m)
         self.problem = (
             f'the reported position jumped by {jump_m:.1f} m, more than it can have flown (limit '
@@ -93,6 +104,17 @@ class JumpWatch:
     def _believe(self, report: PoseReport) -> bool:
         self._believed, self._height_jumped_m, self.problem = report, 0.0, ''
         return True
+
+    def _is_near(self, before: PoseReport, after: PoseReport) -> bool:
+        """Tell whether place and velocity are as the report before foretold, within the limits."""
+        dt_s = (after.boot_ms - before.boot_ms) / 1e3
+        dt_s = dt_s if 0.0 <= dt_s <= GAP_S else 0.0
+        led_to = [p + dt_s * v for p, v in zip(before.position_m, before.velocity_m_s, strict=True)]
+        change_m_s = dist(before.velocity_m_s, after.velocity_m_s)
+        return (
+            dist(led_to, after.position_m) <= self._limit_m
+            and change_m_s <= SLACK_M_S + FASTEST_CHANGE_M_S2 * dt_s
+        )
 
     def _deviation_m(self, before: PoseReport, after: PoseReport) -> float:
         """Return by how much a step exceeds what is allowed; 0 or less when it does not."""
@@ -117,3 +139,20 @@ def _off_course(before: PoseReport, after: PoseReport) -> Vector:
         )
     )
     return north, east, down
+
+
+class Pairwise:
+    """Believes a number when it lies near the one of the message before it.
+
+    Args:
+        limit: Difference that is still believed.
+    """
+
+    def __init__(self, limit: float) -> None:
+        self._limit = limit
+        self._last: float | None = None
+
+    def believes(self, value: float) -> bool:
+        """Take a number; the first is believed."""
+        last, self._last = self._last, value
+        return last is None or abs(value - last) <= self._limit

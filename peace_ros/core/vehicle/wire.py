@@ -33,9 +33,14 @@ class Wire:
         self._stream_parser = _new_parser()
 
     @property
-    def refused(self) -> int:
-        """Messages that were not signed as they should be."""
-        return 0 if self._signer is None else self._signer.unsigned + self._signer.forged
+    def refused(self) -> tuple[int, int]:
+        """Messages without a signature, and with one that is not valid."""
+        return (0, 0) if self._signer is None else (self._signer.unsigned, self._signer.forged)
+
+    @property
+    def warning(self) -> str:
+        """What a person should change of the signing, empty when nothing."""
+        return '' if self._signer is None else self._signer.warning
 
     def restart(self) -> None:
         """Forget half a message: the line was opened anew."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import deque
 from math import isfinite
 
-from peace_ros.simulation.autopilot.estimator import Estimator
+from peace_ros.simulation.autopilot.estimator import RECKONS_PX4_S, RECKONS_S, Estimator
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import RULES, LandedState, Mode, Result, Severity
 from peace_ros.simulation.autopilot.personality import (
@@ -44,7 +44,7 @@ class Flight:
         self.physics = physics
         self.personality = personality or Personality()
         self._ground_msl_m = ground_msl_m
-        self.estimator = Estimator()
+        self.estimator = Estimator(RECKONS_PX4_S if self.personality.is_px4 else RECKONS_S)
         self.time_s = 0.0
         self.mode = Mode.STABILIZE
         self.armed = False

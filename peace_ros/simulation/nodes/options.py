@@ -12,6 +12,9 @@ from peace_ros.core.node_parameters import CameraOptions, Group
 from peace_ros.core.vehicle import AUTO, check_access
 from peace_ros.simulation.autopilot import AutopilotParameters
 
+CAMERA_SYSTEM_ID = 254
+"""Differs from that of the companion, which has its own connection to the same autopilot."""
+
 
 @dataclass(frozen=True)
 class SatelliteViewOptions(ParameterSet):
@@ -74,7 +77,7 @@ class SatelliteViewOptions(ParameterSet):
                 'parameter pose_source = mavlink without pose_mavlink: say where the autopilot is'
             )
         if self.pose_mavlink:
-            check_access(self.pose_mavlink, AUTO, self.pose_signing_key_file)
+            check_access(self.pose_mavlink, AUTO, self.pose_signing_key_file, CAMERA_SYSTEM_ID)
         if not self.world and self.labels:
             raise ConfigurationError(
                 f'parameter labels = {self.labels!r} without world: give the orthophoto too'

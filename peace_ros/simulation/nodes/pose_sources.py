@@ -20,13 +20,12 @@ from peace_ros.nodes.connection import Connection
 from peace_ros.nodes.messages import BODY_FRAME, pose_to_message, transform_from_pose
 from peace_ros.nodes.qos import COMMAND, POSE, POSE_IN
 from peace_ros.nodes.runtime import PeaceNode
+from peace_ros.simulation.nodes.options import CAMERA_SYSTEM_ID
 from peace_ros.simulation.nodes.twist_vehicle import TwistVehicle
 
 _POLL_S = 0.02
 _INTEGRATION_HZ = 50.0
 _TRY_S = 3.0
-_CAMERA_SYSTEM_ID = 254
-"""Differs from that of the companion, which has its own connection to the same autopilot."""
 
 Sink = Callable[[Pose], None]
 
@@ -55,7 +54,7 @@ class MavlinkSource:
         self._sink = sink
         self._output = _PoseOutput(node)
         parameters = VehicleParameters(
-            system_id=_CAMERA_SYSTEM_ID, signing_key_file=signing_key_file
+            system_id=CAMERA_SYSTEM_ID, signing_key_file=signing_key_file
         )
 
         def open_link() -> VehicleLink:

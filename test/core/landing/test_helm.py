@@ -402,3 +402,15 @@ def test_a_last_attempt_is_over_when_no_place_is_known_and_none_is_in_view():
         decided(helm, site=None)
         decision = decided(helm, time_s=11.0, revision=200, site=site, best=None)
         assert decision.state is state
+
+
+def test_an_age_that_grows_is_no_new_reason():
+    trip = Trip()
+    trip.step()
+    problems = [f'HEARTBEAT is {age / 10} s old' for age in range(36, 46)]
+    told = {
+        trip.step(pose=None, position_problem=problem).reason for problem in (*problems, 'jumped')
+    }
+    assert len(told) == 2
+    assert any('3.6 s old' in reason for reason in told)
+    assert any('jumped' in reason for reason in told)

@@ -354,8 +354,10 @@ def test_a_disc_scores_as_its_worst_cell_and_is_as_old_as_its_oldest() -> None:
     ('pose', 'fate'),
     [
         (pose_of(0.99, 0.0, 0.0), 'taken too low above ground'),
-        (pose_of(30.0, float('nan'), 0.0), 'taken too low above ground'),
-        (pose_of(30.0, 0.0, float('inf')), 'taken too low above ground'),
+        (pose_of(30.0, float('nan'), 0.0), 'taken at an impossible place'),
+        (pose_of(30.0, 0.0, float('inf')), 'taken at an impossible place'),
+        (pose_of(30.0, -1e20, 0.0), 'taken at an impossible place'),
+        (pose_of(1e300, 0.0, 0.0), 'taken at an impossible place'),
         (pose_of(30.0, 0.0, 0.0, roll=40.1), 'taken at too much tilt'),
     ],
 )

@@ -130,7 +130,7 @@ def test_a_bad_line_is_flown_through(flying, eventually):
     assert len(poses) > 10
     stamps = [pose.stamp_ns for pose in poses]
     assert stamps == sorted(stamps)
-    assert link.late > 0
+    assert link.counts.late > 0
     assert link.set_mode('LOITER')
     assert not link.taken_over
 
@@ -190,14 +190,14 @@ def test_a_simulation_slower_or_faster_than_time_is_believed(hovering, eventuall
 def test_a_second_companion_is_not_believed(flying, eventually):
     sim, link = flying
     other = open_vehicle(sim.url)
-    before = link.ignored
+    before = link.counts.ignored
     voice = mavlink.MAVLink(None, 1, 191)
     line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     beat = mavlink.MAVLink_heartbeat_message(18, 8, 0, 5, 4, 3)
     line.sendto(beat.pack(voice), ('127.0.0.1', int(sim.url.rpartition(':')[2])))
     assert other.set_mode('LOITER')
     assert eventually(lambda: link.taken_over), 'somebody else chose a mode: it is theirs now'
-    assert eventually(lambda: link.ignored > before), 'the autopilot hands on what others say'
+    assert eventually(lambda: link.counts.ignored > before), 'it hands on what others say'
     other.close()
     line.close()
 
@@ -206,7 +206,7 @@ def test_battery_and_clock_come_along(flying, eventually):
     sim, link = flying
     inject(sim, 'battery', remaining=0.42)
     assert eventually(lambda: link.telemetry().battery_remaining == pytest.approx(0.42), 3.0)
-    assert eventually(lambda: link.clock.samples > 0 or link.clock.steps > 0)
+    assert eventually(lambda: link._clock.samples > 0 or link._clock.steps > 0)
 
 
 def test_a_refusal_and_a_silence_are_told_apart(flying):

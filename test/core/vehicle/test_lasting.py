@@ -141,7 +141,7 @@ def test_follows_an_autopilot_to_a_new_address_after_its_silence(
     threading.Timer(0.1, first.heartbeat).start()
     link = open_vehicle(f'udpin:127.0.0.1:{free_port}', timeout_s=5.0)
     second.position(1000, north=4.0)
-    assert eventually(lambda: link.ignored >= 2), 'not while the first is heard'
+    assert eventually(lambda: link.counts.ignored >= 2), 'not while the first is heard'
 
     def speaks():
         second.heartbeat()

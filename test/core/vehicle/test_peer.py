@@ -49,9 +49,13 @@ def test_a_new_address_is_believed_after_three_seconds_of_silence():
     assert not peer.is_ours(voice(), HERE, 0), 'nobody is, before one was chosen'
     peer.choose(voice(), HERE, 0)
     assert peer.is_ours(voice(), HERE, 2 * SECOND)
+    assert peer.warning == ''
     assert not peer.is_ours(voice(), THERE, 4 * SECOND)
+    assert 'two addresses' in peer.warning
+    assert f'{THERE[0]}:{THERE[1]} is ignored' in peer.warning
     assert peer.is_ours(voice(), THERE, 5 * SECOND)
     assert peer.source == THERE
+    assert 'followed after 3 s of silence' in peer.warning
     assert not peer.is_ours(voice(2), THERE, 60 * SECOND)
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain import ConfigurationError, Setpoint, VehicleError
-from peace_ros.core.vehicle import VehicleParameters, open_vehicle
+from peace_ros.core.vehicle import VehicleParameters, check_access, open_vehicle
 from peace_ros.core.vehicle.signing import Signer, read_key
 from peace_ros.core.vehicle.wire import Wire
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
@@ -43,6 +43,63 @@ def test_a_key_is_32_bytes_or_a_passphrase(tmp_path):
         read_key(str(tmp_path / 'no-such'))
 
 
+def test_32_bytes_of_printable_text_are_a_passphrase(tmp_path):
+    file, words = tmp_path / 'key', b'thirty-one-characters-passphras'
+    file.write_bytes(words + b'\n')
+    assert read_key(str(file)) == hashlib.sha256(words).digest()
+    file.write_bytes(words + b'\0')
+    assert read_key(str(file)) == words + b'\0'
+
+
+@pytest.mark.parametrize('mode', [0o600, 0o640, 0o602, 0o666])
+def test_a_key_that_others_may_read_or_write_is_said(tmp_path, mode):
+    file = tmp_path / 'key'
+    file.write_bytes(KEY)
+    file.chmod(mode)
+    assert ('chmod 600' in Signer.from_file(str(file), 1).warning) == (mode != 0o600)
+
+
+@pytest.mark.parametrize(
+    'content',
+    ['', 'x', '1 2 3', '-1 0', '281474976710656 0', '1 1\n0 1 1 999999999999999999999', '\xff'],
+)
+def test_a_damaged_file_of_time_stamps_is_refused(tmp_path, content):
+    file = tmp_path / 'key'
+    file.write_bytes(KEY)
+    (tmp_path / 'key.1.time').write_text(content, encoding='latin-1')
+    with pytest.raises(ConfigurationError, match='could be replayed'):
+        Signer.from_file(str(file), 1)
+    with pytest.raises(ConfigurationError, match='could be replayed'):
+        check_access('udpin:127.0.0.1:14550', 'auto', str(file), 1)
+
+
+def test_the_largest_time_stamp_does_not_end_the_line(tmp_path):
+    memory, theirs = tmp_path / 'key.time', foreign_codec()
+    theirs.signing.timestamp = 2**48 - 2
+    wire = Wire(1, Signer(KEY, memory), datagrams=True)
+    assert wire.decode(attitude().pack(theirs))
+    assert wire.pack(attitude())
+    wire.keep(0.0, at_once=True)
+    assert Wire(1, Signer(KEY, memory), datagrams=True).pack(attitude())
+
+
+@pytest.mark.parametrize('at_once', [True, False], ids=['orderly end', 'sudden end'])
+def test_nothing_that_was_seen_is_accepted_after_a_restart(tmp_path, at_once):
+    memory, theirs, radio = tmp_path / 'key.time', foreign_codec(), foreign_codec()
+    radio.signing.link_id, radio.signing.timestamp = 7, 2000
+    seen = [attitude(i).pack(each) for i in range(5) for each in (theirs, radio)]
+    wire = Wire(1, Signer(KEY, memory), datagrams=True)
+    assert all(wire.decode(each) for each in seen[:4])
+    wire.keep(0.0, at_once=at_once)
+    assert all(wire.decode(each) for each in seen[4:])
+    if at_once:
+        wire.keep(0.0, at_once=True)
+    again = Wire(1, Signer(KEY, memory), datagrams=True)
+    assert [each for each in seen if again.decode(each)] == []
+    theirs.signing.timestamp += 200_000
+    assert again.decode(attitude(9).pack(theirs)), 'the next second is heard'
+
+
 def test_pymavlink_accepts_what_we_sign_and_we_what_it_signs():
     ours = Wire(1, Signer(KEY), datagrams=True)
     theirs = foreign_codec()
@@ -65,7 +122,7 @@ def test_unsigned_and_wrongly_signed_messages_are_counted_not_believed():
     wire = Wire(1, Signer(KEY), datagrams=True)
     assert wire.decode(attitude().pack(mavlink.MAVLink(None, 1, 1))) == []
     assert wire.decode(attitude().pack(foreign_codec(bytes(32)))) == []
-    assert wire.refused == 2
+    assert wire.refused == (1, 1)
 
 
 def test_a_replay_is_not_believed_nor_does_a_forgery_spoil_the_stream():
@@ -107,6 +164,7 @@ def test_a_disk_that_fails_does_not_stop_the_link(tmp_path):
     signer = Signer(KEY, tmp_path / 'gone' / 'key.time')
     signer.save(0.0, at_once=True)
     assert signer.sign(b'x' * 20)
+    assert 'cannot be written' in signer.warning
 
 
 @pytest.fixture

@@ -205,12 +205,16 @@ def test_wind_battery_text_and_disarm(sim, ear):
 
 def test_gps_loss_lands_and_the_filter_says_why(sim, ear):
     ear.command(511, 193, 200_000)
+    ear.command(511, 24, 200_000)
     assert ear.of('EKF_STATUS_REPORT')[-1].flags & 16
     inject(sim, 'gps_loss')
+    assert ear.of('EKF_STATUS_REPORT')[-1].flags & 16, 'dead reckoning'
+    assert ear.of('GPS_RAW_INT')[-1].fix_type == 1, 'told at once'
+    sim.step(6.7)
     report = ear.of('EKF_STATUS_REPORT')[-1]
     assert report.flags & 128
     assert not report.flags & 24
-    sim.step(7.0)
+    sim.step(2.0)
     assert sim.mode_name == 'LAND'
     inject(sim, 'gps_restore')
     assert sim.flight.has_position

@@ -9,6 +9,7 @@ import pytest
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import LandedState, Mode, Result
+from peace_ros.simulation.autopilot.personality import Kind, Personality
 from peace_ros.simulation.autopilot.physics import Physics
 
 
@@ -190,11 +191,28 @@ def test_rtl_comes_home_and_lands(hovering):
     assert abs(hovering.physics.east_m) < 2.0
 
 
-def test_without_gps_it_lands_after_7_4_s_and_refuses_guided(hovering):
+@pytest.mark.parametrize(('kind', 'reckons_s'), [(Kind.ARDUPILOT, 7.1), (Kind.PX4, 5.4)])
+def test_a_lost_gnss_is_bridged_by_dead_reckoning(kind, reckons_s):
+    flight = Flight(Physics(), Personality(kind))
+    let(flight, 43.0)
+    flight.lose_gps(stale=False)
+    took_s = until(flight, lambda: not flight.estimator.reports_position(flight.time_s), 20.0)
+    assert took_s == pytest.approx(reckons_s, abs=0.1)
+    flight.restore_gps()
+    let(flight, 0.1)
+    flight.lose_gps(stale=False)
+    let(flight, 3.5)
+    assert 0.0 < flight.position_m[0] - flight.physics.north_m < 0.5
+    flight.restore_gps()
+    let(flight, 0.1)
+    assert flight.position_m[0] == flight.physics.north_m
+
+
+def test_without_gps_it_lands_after_7_9_s_and_refuses_guided(hovering):
     hovering.lose_gps(stale=False)
-    assert not hovering.estimator.reports_position(hovering.time_s)
+    assert hovering.estimator.reports_position(hovering.time_s)
     took_s = until(hovering, lambda: hovering.mode is Mode.LAND, 20.0)
-    assert took_s == pytest.approx(7.4, abs=0.1)
+    assert took_s == pytest.approx(7.9, abs=0.1)
     assert 'EKF Failsafe' in texts(hovering)
     assert hovering.set_mode(Mode.GUIDED) is Result.FAILED
     assert 'Mode change to GUIDED failed: requires position' in texts(hovering)

@@ -94,11 +94,12 @@ def test_the_barometer_goes_on_without_a_position(gcs, sim):
     gcs.command(511, 33, 200_000)
     gcs.hear(1.0)
     sim.lose_gps()
+    gcs.hear(8.0)
     sim.flight.physics.north_m += 50.0
     sim.flight.physics.down_m = -12.0
     heard = [m for m in gcs.hear(1.0) if m.get_type() == 'GLOBAL_POSITION_INT']
     assert heard[0].relative_alt == pytest.approx(12_000, abs=500)
-    assert heard[0].lat == pytest.approx(round((48.858 + 3.0 / 111_319.49) * 1e7), abs=20)
+    assert heard[0].lat == pytest.approx(round((48.858 + 3.0 / 111_319.49) * 1e7), abs=70)
 
 
 def test_delivers_20_hz_in_full_once_asked(gcs):
@@ -117,7 +118,7 @@ def test_local_position_is_silent_before_the_origin_and_after_gps_loss(gcs, sim)
     positions = [m for m in gcs.hear(30.0) if m.get_type() == 'LOCAL_POSITION_NED']
     assert positions[-1].x == 3.0
     sim.lose_gps()
-    gcs.hear(0.2)
+    gcs.hear(7.2)
     assert 'LOCAL_POSITION_NED' not in gcs.kinds(2.0)
 
 
