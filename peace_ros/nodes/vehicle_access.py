@@ -65,7 +65,6 @@ class VehicleAccess:
         self.name = options.mavlink
         check_access(options.mavlink, options.dialect, parameters.signing_key_file)
         timeout_s = min(_TRY_S, parameters.connect_timeout_s)
-
         open_link = partial(
             open_vehicle,
             *(options.mavlink, options.dialect, node.clock_ns, parameters, timeout_s, node.fail),
