@@ -14,21 +14,19 @@ from math import cos, sin
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import PointStamped, PoseStamped, TransformStamped, Twist, TwistStamped
-from sensor_msgs.msg import CameraInfo
+from geometry_msgs.msg import PointStamped, PoseStamped, Twist, TwistStamped
 
-from peace_ros.core.domain import Camera, Pose, Prompt, Setpoint, Site
+from peace_ros.core.domain import Pose, Prompt, Setpoint, Site
 from peace_ros.core.domain.geometry import (
     attitude_ned_frd_to_enu_flu,
     ned_to_enu,
     yaw_from_quaternion,
 )
-from peace_ros.core.messages import CAMERA_FRAME, MessageBuilder
+from peace_ros.core.messages import MessageBuilder
 from peace_ros.core.prompting.pairs import prompt_pairs
 
 LOCAL_FRAME = 'map'
 """ENU, origin of the autopilot's local frame."""
-BODY_FRAME = 'base_link'
 
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
@@ -42,6 +40,7 @@ def _class_of(package: str, name: str) -> Any:
 # rclpy takes an array as it is and copies anything else element by element.
 _BUILD = MessageBuilder(_class_of, lambda data: array('B', data))
 time_from_ns = _BUILD.time
+header = _BUILD.header
 image_message = _BUILD.image
 jpeg_message = _BUILD.jpeg
 heatmap_to_image = _BUILD.heatmap
@@ -61,21 +60,10 @@ def pose_to_message(pose: Pose, frame_id: str = LOCAL_FRAME) -> PoseStamped:
     return _BUILD.pose_stamped(pose.stamp_ns, position, attitude, frame_id)
 
 
-def transform_from_pose(pose: Pose, child: str, parent: str = LOCAL_FRAME) -> TransformStamped:
-    """Return the tf transform parent -> child of a pose."""
-    stamped = pose_to_message(pose, parent)
-    message = TransformStamped(header=stamped.header, child_frame_id=child)
-    at = stamped.pose.position
-    to = message.transform.translation
-    to.x, to.y, to.z = at.x, at.y, at.z
-    message.transform.rotation = stamped.pose.orientation
-    return message
-
-
 def setpoint_to_twist_stamped(setpoint: Setpoint, at_ns: int) -> TwistStamped:
     """Return the set-point in ENU, with the stamp of its frame, or ``at_ns`` without a frame."""
     message = TwistStamped()
-    message.header = _BUILD.header(setpoint.stamp_ns or at_ns, LOCAL_FRAME)
+    message.header = header(setpoint.stamp_ns or at_ns, LOCAL_FRAME)
     linear = message.twist.linear
     linear.x, linear.y, linear.z = ned_to_enu(
         setpoint.v_north_m_s, setpoint.v_east_m_s, setpoint.v_down_m_s
@@ -97,21 +85,7 @@ def setpoint_to_body_twist(setpoint: Setpoint, pose: Pose) -> Twist:
 def site_to_message(site: Site, at_ns: int, ground_down_m: float) -> PointStamped:
     """Return the site as an ENU point on the ground (``ground_down_m`` of the local frame)."""
     message = PointStamped()
-    message.header = _BUILD.header(at_ns, LOCAL_FRAME)
+    message.header = header(at_ns, LOCAL_FRAME)
     at = message.point
     at.x, at.y, at.z = ned_to_enu(site.north_m, site.east_m, ground_down_m)
-    return message
-
-
-def camera_info(camera: Camera, at_ns: int, frame_id: str = CAMERA_FRAME) -> CameraInfo:
-    """Return the CameraInfo of a pinhole camera without distortion."""
-    message = CameraInfo()
-    message.header = _BUILD.header(at_ns, frame_id)
-    message.width, message.height = camera.width_px, camera.height_px
-    message.distortion_model = 'plumb_bob'
-    message.d = [0.0] * 5
-    f, (u, v) = camera.focal_px, camera.centre_px
-    message.k = [f, 0.0, u, 0.0, f, v, 0.0, 0.0, 1.0]
-    message.r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    message.p = [f, 0.0, u, 0.0, 0.0, f, v, 0.0, 0.0, 0.0, 1.0, 0.0]
     return message

@@ -67,7 +67,6 @@ class VehicleAccess:
         key_file, system_id = parameters.signing_key_file, parameters.system_id
         check_access(options.mavlink, options.dialect, key_file, system_id)
         timeout_s = min(_TRY_S, parameters.connect_timeout_s)
-
         open_link = partial(
             open_vehicle,
             *(options.mavlink, options.dialect, node.clock_ns, parameters, timeout_s, node.fail),

@@ -17,7 +17,6 @@ from sensor_msgs.msg import CompressedImage, Image
 
 from peace_ros.core import messages as readers
 from peace_ros.core.domain import (
-    Camera,
     ConfigurationError,
     Heatmap,
     ImageError,
@@ -159,13 +158,6 @@ def test_a_pose_that_is_none_is_refused(change):
         readers.pose_from_message(message)
 
 
-def test_a_transform_is_read_as_a_pose():
-    pose = Pose(STAMP, 5.0, -6.0, -70.0, quaternion_from_euler(0.1, 0.0, 2.0), 70.0)
-    transform = messages.transform_from_pose(pose, 'flying_sensor')
-    assert (transform.header.frame_id, transform.child_frame_id) == ('map', 'flying_sensor')
-    assert readers.pose_from_transform(transform).north_m == pytest.approx(5.0)
-
-
 def test_a_setpoint_is_enu_with_the_stamp_of_its_frame():
     message = messages.setpoint_to_twist_stamped(Setpoint(STAMP, 1.0, 2.0, 3.0), 5)
     linear = message.twist.linear
@@ -188,11 +180,3 @@ def test_a_twist_goes_along_the_image(heading_deg, forward, left):
 def test_a_site_is_a_point_on_the_ground():
     message = messages.site_to_message(Site(3.0, 4.0, 8.0, 200.0, 0.9, 0.1), STAMP, 1.5)
     assert (message.point.x, message.point.y, message.point.z) == (4.0, 3.0, -1.5)
-
-
-def test_camera_info_holds_the_focal_length():
-    camera = Camera.from_degrees(352, 352, 73.0)
-    info = messages.camera_info(camera, STAMP)
-    assert (info.width, info.height) == (352, 352)
-    assert info.k[0] == pytest.approx(camera.focal_px)
-    assert info.k[2] == 175.5

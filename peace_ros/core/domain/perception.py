@@ -114,11 +114,7 @@ class Heatmap:
     """Stamp of the frame."""
 
     def __post_init__(self) -> None:
-        safety = self.safety
-        if safety.ndim != 2 or safety.dtype != np.float32 or safety.size == 0:
-            raise ImageError(
-                f'heatmap of shape {safety.shape}, {safety.dtype}: give height x width float32'
-            )
+        _check_map('heatmap', self.safety)
 
 
 @dataclass(frozen=True)
@@ -131,8 +127,11 @@ class DepthImage:
     """When the sensor took it, node clock."""
 
     def __post_init__(self) -> None:
-        depth = self.depth_m
-        if depth.ndim != 2 or depth.dtype != np.float32 or depth.size == 0:
-            raise ImageError(
-                f'depth image of shape {depth.shape}, {depth.dtype}: give height x width float32'
-            )
+        _check_map('depth image', self.depth_m)
+
+
+def _check_map(kind: str, values: NDArray[np.float32]) -> None:
+    if values.ndim != 2 or values.dtype != np.float32 or values.size == 0:
+        raise ImageError(
+            f'{kind} of shape {values.shape}, {values.dtype}: give height x width float32'
+        )

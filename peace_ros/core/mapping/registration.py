@@ -167,17 +167,10 @@ def _patch(
     if not np.all(depth > 0.0):
         return None
     u, v = u / depth, v / depth
-    if (
-        min(u.min(), v.min()) < 0.0
-        or u.max() > small.width_px - 1.0
-        or v.max() > small.height_px - 1.0
-    ):
+    if min(u.min(), v.min()) < 0.0 or u.max() > small.width_px - 1 or v.max() > small.height_px - 1:
         return None
     ground = cv2.warpPerspective(
-        view.grey,
-        matrix,
-        (PATCH_PX, PATCH_PX),
-        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        view.grey, matrix, (PATCH_PX, PATCH_PX), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     )
     smooth = cv2.GaussianBlur(ground.astype(np.float32), (0, 0), 1.0)
     return cast('NDArray[np.float32]', smooth)

@@ -3,12 +3,10 @@
 """From a camera frame to the prompt that describes it."""
 
 from peace_ros.core.prompting.generator import Encoder, PromptGenerator, PromptingParameters
-from peace_ros.core.prompting.templates import TEMPLATES, categories_of, resolve_template
-from peace_ros.core.prompting.vocabulary import CATEGORIES, Vocabularies, load_vocabularies
+from peace_ros.core.prompting.templates import categories_of, resolve_template
+from peace_ros.core.prompting.vocabulary import Vocabularies, load_vocabularies
 
 __all__ = [
-    'CATEGORIES',
-    'TEMPLATES',
     'Encoder',
     'PromptGenerator',
     'PromptingParameters',

@@ -22,11 +22,9 @@ class Encoder(Protocol):
 
     def image_embedding(self, frame: Frame) -> NDArray[np.float32]:
         """Return (D,) float32 of unit length."""
-        ...
 
     def text_embeddings(self, texts: Sequence[str]) -> NDArray[np.float32]:
         """Return (T, D) float32 of unit length."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -92,12 +90,11 @@ class _Category:
         self.words = words
         self._embeddings = embeddings
         self._count = min(count, len(words))
-        self._smoothed: NDArray[np.float32] | None = None
-        self._chosen: list[int] = []
+        self.reset()
 
     def reset(self) -> None:
-        self._smoothed = None
-        self._chosen = []
+        self._smoothed: NDArray[np.float32] | None = None
+        self._chosen: list[int] = []
 
     def look(self, image: NDArray[np.float32], smoothing: float) -> NDArray[np.float32]:
         """Take in one frame; return the smoothed cosine similarity of each word."""
@@ -159,15 +156,12 @@ class PromptGenerator:
                 f'prompt template {self._sentence!r} asks for words but there is no encoder or '
                 'no vocabularies; give both or use a static template (DD, D)'
             )
-        every = [word for name in names for word in vocabularies.words(name)]
-        embeddings = encoder.text_embeddings(every)
-        start = 0
-        for name in names:
-            words = vocabularies.words(name)
+        words = [vocabularies.words(name) for name in names]
+        embeddings = encoder.text_embeddings([word for each in words for word in each])
+        parts = np.split(embeddings, np.cumsum([len(each) for each in words])[:-1])
+        for name, own, rows in zip(names, words, parts, strict=True):
             count = parameters.environment_words if name == 'environment' else 1
-            rows = embeddings[start : start + len(words)]
-            self._categories[name] = _Category(words, rows, count)
-            start += len(words)
+            self._categories[name] = _Category(own, rows, count)
 
     def reset(self) -> None:
         """Forget the frames so far; the next one is ranked on its own."""

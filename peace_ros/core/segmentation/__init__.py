@@ -5,7 +5,7 @@
 from peace_ros.core.segmentation.camera_watch import CameraWatch
 from peace_ros.core.segmentation.clipseg import ClipSegParameters, ClipSegSegmenter
 from peace_ros.core.segmentation.fastsam import FastSamParameters, FastSamSegmenter
-from peace_ros.core.segmentation.fusion import FUSIONS, Fusion, set_difference, soft_difference
+from peace_ros.core.segmentation.fusion import FUSIONS, set_difference
 from peace_ros.core.segmentation.overlay import draw_overlay
 from peace_ros.core.segmentation.registry import FAMILIES, Family, Log, create_segmenter, family_of
 from peace_ros.core.segmentation.segmenter import SegmentationParameters, Segmenter
@@ -20,7 +20,6 @@ __all__ = [
     'Family',
     'FastSamParameters',
     'FastSamSegmenter',
-    'Fusion',
     'Log',
     'SegmentationParameters',
     'Segmenter',
@@ -30,5 +29,4 @@ __all__ = [
     'family_of',
     'load_terms',
     'set_difference',
-    'soft_difference',
 ]

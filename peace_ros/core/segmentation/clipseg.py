@@ -89,9 +89,7 @@ class ClipSegSegmenter(BundleSegmenter):
         """Return the maps that are seen in the frame, each of the whole and of its parts."""
         image, size = frame.image_rgb, self._manifest.input
         parts = parts_of(
-            (image.shape[1], image.shape[0]),
-            (size.width, size.height),
-            self._max_looks,
+            (image.shape[1], image.shape[0]), (size.width, size.height), self._max_looks
         )
         whole = see(image)
         answers = [see(part.of(image)) for part in parts]

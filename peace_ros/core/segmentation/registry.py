@@ -23,11 +23,9 @@ class Log(Protocol):
 
     def info(self, message: str, /) -> object:
         """Tell a fact."""
-        ...
 
     def warning(self, message: str, /) -> object:
         """Tell what someone should change."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,6 @@ class Segmenter(Protocol):
         Raises ImageError for an image that cannot be used, BundleError for an answer of the
         network that cannot be used.
         """
-        ...
 
     def term_maps(self, frame: Frame, prompt: Prompt) -> NDArray[np.float32]:  # noqa: ARG002
         """Return one map per term, [T, h, w] float32 0 to 1, in the order of ``terms.all``."""

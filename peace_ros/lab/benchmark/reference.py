@@ -159,7 +159,7 @@ class _FastSamReference:
         self, image: NDArray[np.uint8], segment: Segment, *, with_texts: bool
     ) -> torch.Tensor:
         """Return a segment's share of every term."""
-        crop = image[segment.rows, segment.columns] * segment.mask[:, :, None]
+        crop = image[segment.slices] * segment.mask[:, :, None]
         pixels = self._processor(Image.fromarray(crop), return_tensors='pt')['pixel_values']
         if with_texts:
             logits = self._clip(**self._texts, pixel_values=pixels).logits_per_image

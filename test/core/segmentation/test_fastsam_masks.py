@@ -34,7 +34,7 @@ def found(reference: dict[str, Any], case: str) -> Detections:
 
 def full(segment: Segment) -> Any:
     mask = np.zeros((SIDE_PX, SIDE_PX), bool)
-    mask[segment.rows, segment.columns] = segment.mask
+    mask[segment.slices] = segment.mask
     return mask
 
 
@@ -84,7 +84,7 @@ def test_masks_end_where_the_frame_ends(reference: dict[str, Any]) -> None:
     assert inside
     for segment in inside:
         within = full(whole[segment.confidence])[place.slices]
-        part = within[segment.rows, segment.columns]
+        part = within[segment.slices]
         np.testing.assert_array_equal(part, segment.mask)
         assert segment.area_px == np.count_nonzero(within)
 

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from peace_ros.core.segmentation import FUSIONS, set_difference, soft_difference
-from peace_ros.core.segmentation.fusion import calibrated
+from peace_ros.core.segmentation.fusion import FUSIONS, calibrated, set_difference, soft_difference
 
 SCORES = arrays(np.float32, (3, 4), elements=st.floats(0.0, 1.0, width=32))
 Maps = NDArray[np.float32]

@@ -103,7 +103,7 @@ def test_most_cars_lie_in_a_segment_of_their_size(
             total += 1
             mask = marks == car
             found += any(
-                np.count_nonzero(mask[each.rows, each.columns] & each.mask)
+                np.count_nonzero(mask[each.slices] & each.mask)
                 > 0.5 * (each.area_px + stats[car][4]) / 2
                 for each in segments.scored
             )

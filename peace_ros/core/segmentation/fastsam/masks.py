@@ -52,14 +52,13 @@ class Segment:
     """Area of the mask with its logit STABILITY_OFFSET lower over that with it higher, 0 to 1."""
 
     @property
-    def rows(self) -> slice:
-        """Rows of the mask."""
-        return slice(self.top_px, self.top_px + self.mask.shape[0])
-
-    @property
-    def columns(self) -> slice:
-        """Columns of the mask."""
-        return slice(self.left_px, self.left_px + self.mask.shape[1])
+    def slices(self) -> tuple[slice, slice]:
+        """Rows and columns of the mask."""
+        height, width = self.mask.shape
+        return (
+            slice(self.top_px, self.top_px + height),
+            slice(self.left_px, self.left_px + width),
+        )
 
 
 def detect(

@@ -42,7 +42,7 @@ class Selection:
             *((self.scored[index], index + 1) for index in order),
             *((segment, UNKNOWN) for segment in self.unknown),
         ):
-            labels[segment.rows, segment.columns][segment.mask] = label
+            labels[segment.slices][segment.mask] = label
         return labels
 
 
