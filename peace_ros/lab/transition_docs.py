@@ -26,11 +26,11 @@ _KNOWN = {info.name: info for info in describe(LandingParameters)}
 def markdown() -> str:
     """Return the table of what outranks every plan, and that of the plan of each state."""
     rows = [
-        '| what holds, the first first | next state | reason in the status |',
+        '| what holds, checked from top to bottom | next state | reason in the status |',
         '|---|---|---|',
         *(_row((_words(rule), rule.target.value, _reason(rule))) for rule in GUARDS),
         '',
-        '| state | what holds, the first first | next state | reason in the status |',
+        '| state | what holds, checked from top to bottom | next state | reason in the status |',
         '|---|---|---|---|',
     ]
     rows += [

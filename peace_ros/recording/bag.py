@@ -7,12 +7,14 @@ from __future__ import annotations
 import shutil
 import struct
 import tempfile
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, final
 
 from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.interfaces import (
+    Connection,
     Qos,
     QosDurability,
     QosHistory,
@@ -33,12 +35,6 @@ from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from peace_ros.core.domain import RecordingError
 
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
-
-    from rosbags.interfaces import Connection
-    from typing_extensions import Self
-
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 """Message classes of ROS 2 Jazzy, shared by all readers and writers of the package."""
 
@@ -58,6 +54,7 @@ _UNREADABLE = (
 """What rosbags lets out, beside its own errors, on files that are cut short or overwritten."""
 
 
+@final
 class BagReader:
     """A bag folder (``metadata.yaml`` beside its files), an ``.mcap`` or a ``.db3`` file.
 
@@ -75,7 +72,7 @@ class BagReader:
             )
         self._reader: AnyReader | None = None
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> BagReader:
         """Open the file.
 
         Raises:
@@ -162,6 +159,7 @@ class BagReader:
         )
 
 
+@final
 class BagWriter:
     """Write one ``.mcap`` file.
 
@@ -181,7 +179,7 @@ class BagWriter:
         self.counts: dict[str, int] = {}
         """Topic -> messages written so far."""
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> BagWriter:
         """Create the hidden folder.
 
         Raises:

@@ -95,7 +95,7 @@ class TrajectoryScene:
         return max(20.0, 10.0 * ceil(highest / 10.0))
 
 
-class _View:
+class _MapView:
     """A square of the world, drawn north up; ground beyond the world is mirrored."""
 
     def __init__(self, scene: TrajectoryScene) -> None:
@@ -136,7 +136,7 @@ def draw_trajectory(scene: TrajectoryScene) -> Image:
     """
     if not scene.track:
         raise RecordingError('a trajectory of 0 points cannot be drawn: no pose was recorded')
-    view = _View(scene)
+    view = _MapView(scene)
     sheet = canvas.sheet(_MAP_PX + _PANEL_PX, _MAP_PX)
     ground = canvas.window(sheet, 0, 0, _MAP_PX, _MAP_PX)
     image = view.picture(scene.world_rgb, scene.gsd_m)
@@ -214,7 +214,7 @@ def nice_length_m(at_most_m: float) -> float:
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= at_most_m * 1.0001)
 
 
-def _draw_scale(ground: Axes, view: _View) -> None:
+def _draw_scale(ground: Axes, view: _MapView) -> None:
     """Draw a bar with its length, and an arrow to the north."""
     length_m = nice_length_m(view.span_m / 4.0)
     east, north = view.low_m + 0.03 * view.span_m
@@ -254,7 +254,7 @@ def _draw_profile(axes: Axes, scene: TrajectoryScene) -> None:
         spine.set(color=canvas.FAINT, visible=side in {'left', 'bottom'})
 
 
-def _draw_inset(axes: Axes, view: _View, scene: TrajectoryScene) -> None:
+def _draw_inset(axes: Axes, view: _MapView, scene: TrajectoryScene) -> None:
     """Show the whole world, small, with the frame of the map on it."""
     east, north = scene.size_m
     extent_m = (-east / 2, east / 2, -north / 2, north / 2)

@@ -4,20 +4,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import Frame, Pose, RecordingError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from typing_extensions import Self
 
 VIDEO_SUFFIXES = ('.mp4', '.avi', '.mkv', '.mov', '.webm', '.m4v')
 
@@ -68,7 +64,7 @@ class VideoReader:
         """Open a file.
 
         ``frame_hz`` is the rate at which the camera took the frames, where the file was written
-        to play faster than life; the file's own rate when None.
+        to play faster than real time; the file's own rate when None.
 
         Raises:
             RecordingError: the file is missing or no video that OpenCV reads.
@@ -123,6 +119,7 @@ class VideoReader:
         return Pose(self.stamp_ns(index), 0.0, 0.0, -altitude, _LEVEL_NORTH, altitude)
 
 
+@final
 class VideoWriter:
     """Write an MPEG-4 file that appears under its name only when whole."""
 
@@ -133,7 +130,7 @@ class VideoWriter:
         self._writer: cv2.VideoWriter | None = None
         self._size: tuple[int, int] | None = None
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> VideoWriter:
         """Return itself; the file is created with the first frame, which gives its size."""
         return self
 

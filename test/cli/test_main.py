@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import inspect
 import shutil
 import subprocess
 import sys
@@ -13,10 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from peace_ros import __version__
-from peace_ros.cli.demo import demo
 from peace_ros.cli.main import app
 from peace_ros.core.resources import models_dir
-from peace_ros.simulation.demo.options import DEFAULT_TIMEOUT_S
 
 SMALL_BUNDLES = ('clip-small', 'clipseg-small')
 
@@ -47,11 +44,6 @@ def test_the_verbs_have_their_options(verb, options) -> None:
     told = CliRunner().invoke(app, [*verb.split(), '--help'], env={'COLUMNS': '200'}).output
     for option in options.split():
         assert option in told
-
-
-def test_the_demo_waits_as_long_as_its_options_say() -> None:
-    """The command line cannot import them: its help would take as long as the nodes."""
-    assert inspect.signature(demo).parameters['timeout'].default == DEFAULT_TIMEOUT_S
 
 
 def test_help_imports_nothing_heavy() -> None:

@@ -63,25 +63,21 @@ def write_clipseg_graphs(
     with torch.no_grad():
         features = tower(pixels)
     width = int(reference.config.projection_dim)
-    write_graph(
-        prepare('decoder', ClipSegDecoderGraph(reference, tower.rows)),
-        (*features, torch.zeros(3, width), torch.tensor([1.0, 1.0, 0.0])),
-        folder / 'decoder.onnx',
-        (*names, contract.TEXT_EMBEDDING, contract.IS_POSITIVE),
-        (contract.POSITIVE, contract.NEGATIVE, contract.SOFTMAX_POSITIVE, contract.TERM_LOGITS),
-        {
-            contract.TEXT_EMBEDDING: _PER_TERM,
-            contract.IS_POSITIVE: _PER_TERM,
-            contract.TERM_LOGITS: _PER_TERM,
-        },
-    )
+    decoder = prepare('decoder', ClipSegDecoderGraph(reference, tower.rows))
+    sides = torch.tensor([1.0, 1.0, 0.0])
+    write_decoder(decoder, (*features, torch.zeros(3, width), sides), folder, names)
 
 
 def _write_text(tower: TextTower, folder: Path) -> None:
     ids = torch.full((2, 5), tower.end_of_text)
+    write_text_encoder(tower, (ids, torch.ones_like(ids)), folder)
+
+
+def write_text_encoder(tower: nn.Module, tokens: tuple[Tensor, Tensor], folder: Path) -> None:
+    """Write text_encoder.onnx for any number of texts; ``tokens``: ids and mask of some."""
     write_graph(
         tower,
-        (ids, torch.ones_like(ids)),
+        tokens,
         folder / 'text_encoder.onnx',
         (contract.INPUT_IDS, contract.ATTENTION_MASK),
         (contract.TEXT_EMBEDDING,),
@@ -90,6 +86,22 @@ def _write_text(tower: TextTower, folder: Path) -> None:
             contract.ATTENTION_MASK: _BATCH_AND_LENGTH,
             contract.TEXT_EMBEDDING: {0: 'B'},
         },
+    )
+
+
+def write_decoder(
+    decoder: nn.Module, inputs: tuple[Tensor, ...], folder: Path, features: Sequence[str]
+) -> None:
+    """Write decoder.onnx for any number of terms; the first inputs are called ``features``."""
+    write_graph(
+        decoder,
+        inputs,
+        folder / 'decoder.onnx',
+        (*features, contract.TEXT_EMBEDDING, contract.IS_POSITIVE),
+        (contract.POSITIVE, contract.NEGATIVE, contract.SOFTMAX_POSITIVE, contract.TERM_LOGITS),
+        dict.fromkeys(
+            (contract.TEXT_EMBEDDING, contract.IS_POSITIVE, contract.TERM_LOGITS), _PER_TERM
+        ),
     )
 
 

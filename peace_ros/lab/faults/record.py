@@ -8,7 +8,7 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import hypot, inf, nan
+from math import inf, nan
 
 from peace_ros.core.landing import State
 
@@ -144,13 +144,6 @@ class Record:
         """Return the lowest true altitude since the injection."""
         heights = [t.altitude_agl_m for t in self.truths if t.at_s <= until_s]
         return min(heights, default=nan)
-
-    def moved_m(self) -> float:
-        """Return how far the vehicle is from where it was at the injection."""
-        if not self.truths:
-            return nan
-        first, last = self.truths[0], self.truths[-1]
-        return hypot(last.north_m - first.north_m, last.east_m - first.east_m)
 
 
 def longest_gap_s(times_s: Iterable[float], begin_s: float, end_s: float) -> float:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from peace_ros.core.domain import PeaceError, RecordingError
 from peace_ros.core.pipeline import SegmentedFrame
 from peace_ros.core.presets import DEFAULT_PRESET
+from peace_ros.lab.export.agreement import mask_iou
 from peace_ros.lab.replay.line import Step
 from peace_ros.lab.replay.report import SAFE_FROM
 from peace_ros.lab.replay.run import Replayer
@@ -139,16 +140,10 @@ def differences(found: Reference, expected: Reference) -> list[str]:
     return told + _state_differences(found.states, expected.states)
 
 
-def intersection_over_union(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
-    """Return the overlap of two masks, 0 to 1; 1 when both are empty."""
-    union = int((a | b).sum())
-    return 1.0 if union == 0 else int((a & b).sum()) / union
-
-
 def _overlaps(found: NDArray[np.bool_], expected: NDArray[np.bool_]) -> list[str]:
     told = []
     for name, a, b in (('safe', found, expected), ('not safe', ~found, ~expected)):
-        overlap = intersection_over_union(a, b)
+        overlap = mask_iou(a, b)
         if overlap < LEAST_IOU:
             told.append(f'what is called {name} overlaps by {overlap:.3f}, least {LEAST_IOU}')
     return told

@@ -4,19 +4,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from peace_ros.lab.replay.report import ReplayReport
 from peace_ros.lab.replay.run import ReplayOptions, replay
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rich.console import Console
-
-    from peace_ros.lab.replay.report import ReplayReport
 
 
 def replay_in_terminal(options: ReplayOptions, console: Console) -> ReplayReport:

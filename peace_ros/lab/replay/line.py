@@ -7,14 +7,11 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from peace_ros.core.domain import Camera, Frame, Pose, Telemetry
 from peace_ros.core.landing import Decision
 from peace_ros.core.pipeline import Pipeline, SegmentedFrame, create_landing
-
-if TYPE_CHECKING:
-    from peace_ros.core.presets import Preset
+from peace_ros.core.presets import Preset
 
 STEP_NS = 100_000_000
 """The landing core decides at 10 Hz of recorded time."""

@@ -6,32 +6,28 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import TracebackType
+from typing import final
 
 import cv2
+import numpy as np
+from numpy.typing import NDArray
 
 from peace_ros.core.landing.pairs import decision_pairs
+from peace_ros.core.pipeline import SegmentedFrame
 from peace_ros.core.prompting.pairs import prompt_pairs
 from peace_ros.core.segmentation import draw_overlay
+from peace_ros.lab.replay.line import Step
 from peace_ros.recording import BagWriter, VideoWriter, save_picture
 from peace_ros.recording.contact_sheet import Cell, draw_contact_sheet
 from peace_ros.recording.messages import diagnostic_array, heatmap_to_image, jpeg_message
-
-if TYPE_CHECKING:
-    from types import TracebackType
-
-    import numpy as np
-    from numpy.typing import NDArray
-    from typing_extensions import Self
-
-    from peace_ros.core.pipeline import SegmentedFrame
-    from peace_ros.lab.replay.line import Step
 
 _CELLS = 20
 _OK, _WARN = 0, 1
 _QUIET_STATES = frozenset({'HOLD', 'ABORTED'})
 
 
+@final
 class ReplayOutputs:
     """The files of a replay; a bag and a video appear under their names only when whole."""
 
@@ -54,7 +50,7 @@ class ReplayOutputs:
         self._looks = 0
         self._caption = ''
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> ReplayOutputs:
         """Create the files."""
         self._files.enter_context(self._bag)
         if self._video is not None:

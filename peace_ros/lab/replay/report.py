@@ -8,15 +8,12 @@ import json
 from collections import Counter
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from peace_ros.core.pipeline import SegmentedFrame
+from peace_ros.lab.replay.line import Step
 from peace_ros.recording.run_folder import write_whole
-
-if TYPE_CHECKING:
-    from peace_ros.core.pipeline import SegmentedFrame
-    from peace_ros.lab.replay.line import Step
 
 SAFE_FROM = 0.5
 """Heatmap value from which the counts call a pixel safe."""

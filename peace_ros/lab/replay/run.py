@@ -5,10 +5,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from peace_ros.core.domain import Camera, PeaceError, RecordingError
 from peace_ros.core.pipeline import SegmentedFrame
@@ -24,9 +23,6 @@ from peace_ros.lab.replay.source import (
     open_source,
 )
 from peace_ros.recording.run_folder import create_run_folder
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 Progress = Callable[[int, int, str], None]
 """Called with frames done, frames in all, and what the landing core does."""

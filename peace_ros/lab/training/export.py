@@ -17,7 +17,7 @@ from torch.nn import functional
 from peace_ros.core.domain import Label
 from peace_ros.core.inference import contract
 from peace_ros.core.inference.manifest import InputSpec
-from peace_ros.lab.export.graphs import write_graph
+from peace_ros.lab.export.graphs import write_decoder, write_graph, write_text_encoder
 from peace_ros.lab.export.staging import write_manifest
 from peace_ros.lab.training import networks
 from peace_ros.lab.training.backbone import MEAN, STD
@@ -27,7 +27,6 @@ from peace_ros.lab.training.text import CONTEXT_LENGTH, build_tokenizer
 
 RANKER_PX = 224
 _HALF_FROM_ELEMENTS = 64
-_BATCH_AND_LENGTH = {0: 'B', 1: 'L'}
 PEOPLE_TILT = 1.5
 """Added to the logit of people before prompts are read: missed ones cost more than false ones."""
 _PEOPLE = slice(Label.PERSON - 1, Label.PERSON)
@@ -69,19 +68,6 @@ def _grow(maps: Tensor) -> Tensor:
     )
 
 
-def export_graph(
-    module: nn.Module, inputs: tuple[Tensor, ...], path: Path, names: tuple[str, ...],
-    outputs: tuple[str, ...], axes: dict[str, dict[int, str]] | None = None, *, halve: bool,
-) -> None:  # fmt: skip
-    """Write a module as a graph; ``halve`` stores its large weights in half the bytes."""
-    write_graph(module, inputs, path, names, outputs, axes)
-    graph = onnx.load(str(path))
-    if halve:
-        halve_weights(graph)
-    onnx.checker.check_model(graph)
-    onnx.save(graph, str(path))
-
-
 def halve_weights(model: onnx.ModelProto) -> None:
     """Store large weights as float16 with a cast to float32 before their use.
 
@@ -101,28 +87,22 @@ def halve_weights(model: onnx.ModelProto) -> None:
         graph.node.insert(offset, node)
 
 
-def export_text(text: nn.Module, folder: Path, *, halve: bool) -> None:
-    """Write a text tower and its tokenizer."""
-    export_graph(
-        text,
-        encode(['grass', 'a road']),
-        folder / 'text_encoder.onnx',
-        (contract.INPUT_IDS, contract.ATTENTION_MASK),
-        (contract.TEXT_EMBEDDING,),
-        {
-            contract.INPUT_IDS: _BATCH_AND_LENGTH,
-            contract.ATTENTION_MASK: _BATCH_AND_LENGTH,
-            contract.TEXT_EMBEDDING: {0: 'B'},
-        },
-        halve=halve,
-    )
+def finish_bundle(
+    folder: Path, text: nn.Module, family: str, inputs: dict[str, InputSpec], *, halve: bool,
+    **values: Any,
+) -> None:  # fmt: skip
+    """Add text tower, tokenizer and manifest to the graphs of a bundle that was trained here.
+
+    ``halve`` stores the large weights of all graphs in half the bytes.
+    """
+    write_text_encoder(text, encode(['grass', 'a road']), folder)
     build_tokenizer().save(str(folder / 'tokenizer.json'))
-
-
-def write_trained_manifest(
-    folder: Path, family: str, inputs: dict[str, InputSpec], **values: Any
-) -> None:
-    """Write the manifest of a bundle that was trained here."""
+    for path in folder.glob('*.onnx'):
+        graph = onnx.load(str(path))
+        if halve:
+            halve_weights(graph)
+        onnx.checker.check_model(graph)
+        onnx.save(graph, str(path))
     write_manifest(
         folder, folder.name, family, inputs, **values, embedding_width=networks.EMBEDDING_WIDTH,
         context_length=CONTEXT_LENGTH, precision='fp32', licence='Apache-2.0',
@@ -136,31 +116,17 @@ def export_segmenter(
     """Write the clipseg bundle."""
     folder.mkdir(parents=True, exist_ok=True)
     pixels = torch.zeros(1, 3, FRAME_PX, FRAME_PX)
-    export_graph(model.encoder, (pixels,), folder / 'image_encoder.onnx', (contract.PIXEL_VALUES,),
-                 ('features',), halve=halve)  # fmt: skip
-    export_text(model.text, folder, halve=halve)
+    path = folder / 'image_encoder.onnx'
+    write_graph(model.encoder, (pixels,), path, (contract.PIXEL_VALUES,), ('features',))
     side = FRAME_PX // networks.STRIDE
-    export_graph(
-        DecoderGraph(model.decoder),
-        (
-            torch.zeros(1, networks.FEATURE_CHANNELS, side, side),
-            torch.zeros(3, networks.EMBEDDING_WIDTH),
-            torch.tensor([1.0, 0.0, 0.0]),
-        ),
-        folder / 'decoder.onnx',
-        ('features', contract.TEXT_EMBEDDING, contract.IS_POSITIVE),
-        (contract.POSITIVE, contract.NEGATIVE, contract.SOFTMAX_POSITIVE, contract.TERM_LOGITS),
-        {
-            contract.TEXT_EMBEDDING: {0: 'T'},
-            contract.IS_POSITIVE: {0: 'T'},
-            contract.TERM_LOGITS: {0: 'T'},
-        },
-        halve=halve,
-    )
+    features = torch.zeros(1, networks.FEATURE_CHANNELS, side, side)
+    texts, sides = torch.zeros(3, networks.EMBEDDING_WIDTH), torch.tensor([1.0, 0.0, 0.0])
+    write_decoder(DecoderGraph(model.decoder), (features, texts, sides), folder, ['features'])
     spec = InputSpec(FRAME_PX, FRAME_PX, 'stretch', MEAN, STD)
-    write_trained_manifest(
-        folder, 'clipseg', {'input': spec}, provenance=provenance, recommended=recommended or {}
-    )
+    finish_bundle(
+        folder, model.text, 'clipseg', {'input': spec}, halve=halve, provenance=provenance,
+        recommended=recommended or {},
+    )  # fmt: skip
 
 
 def export_ranker(
@@ -169,8 +135,10 @@ def export_ranker(
     """Write the clip bundle."""
     folder.mkdir(parents=True, exist_ok=True)
     pixels = torch.zeros(1, 3, RANKER_PX, RANKER_PX)
-    export_graph(model.image, (pixels,), folder / 'image_encoder.onnx', (contract.PIXEL_VALUES,),
-                 (contract.IMAGE_EMBEDDING,), halve=halve)  # fmt: skip
-    export_text(model.text, folder, halve=halve)
+    path, names = folder / 'image_encoder.onnx', (contract.PIXEL_VALUES,)
+    write_graph(model.image, (pixels,), path, names, (contract.IMAGE_EMBEDDING,))
     spec = InputSpec(RANKER_PX, RANKER_PX, 'stretch', MEAN, STD)
-    write_trained_manifest(folder, 'clip', {'input': spec}, provenance=provenance, recommended={})
+    finish_bundle(
+        folder, model.text, 'clip', {'input': spec}, halve=halve, provenance=provenance,
+        recommended={},
+    )  # fmt: skip

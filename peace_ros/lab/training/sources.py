@@ -51,15 +51,9 @@ class TrainingSource:
 
 
 def build_source(
-    name: str,
-    kind: str,
-    image_rgb: Image,
-    classes: Image,
-    gsd_m: float,
-    frame_side_px: tuple[float, float],
-    season: str = '',
-    origin: str = '',
-) -> TrainingSource:
+    name: str, kind: str, image_rgb: Image, classes: Image, gsd_m: float,
+    frame_side_px: tuple[float, float], season: str = '', origin: str = '',
+) -> TrainingSource:  # fmt: skip
     """Halve image and classes as often as the largest frame needs."""
     images, rasters = [image_rgb], [classes]
     while frame_side_px[1] / 2 ** len(images) > FRAME_PX * 0.75 and min(images[-1].shape[:2]) > 256:

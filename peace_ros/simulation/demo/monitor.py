@@ -7,8 +7,9 @@ from __future__ import annotations
 import struct
 import threading
 from collections import Counter, OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -26,14 +27,10 @@ from peace_ros.core.messages import (
     stamp_ns_of,
 )
 from peace_ros.nodes import qos
+from peace_ros.recording import BagWriter
 from peace_ros.recording.messages import jpeg_message
 from peace_ros.simulation.demo.history import History, Status
 from peace_ros.simulation.demo.listener import Listener
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from peace_ros.recording import BagWriter
 
 IMAGE, PROMPT, HEATMAP = '/image', '/prompt', '/heatmap'
 STATUS, POSE = '/landing/status', '/ground_truth/pose'

@@ -4,14 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from peace_ros.simulation.demo.worlds import DemoWorld
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 CAMERA_HZ = 10.0
 """Frames per second of the wall clock; more would only be dropped by two cores."""

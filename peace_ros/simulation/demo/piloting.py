@@ -5,23 +5,20 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import final
 
 from peace_ros.core.domain import VehicleError
 from peace_ros.core.vehicle import MavlinkLink, open_vehicle
 from peace_ros.simulation.demo.options import refuse_to_arm_elsewhere
 from peace_ros.simulation.demo.pilot import Pilot
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from typing_extensions import Self
-
 CONNECT_S = 90.0
 _AGAIN_S = 1.0
 _AIRBORNE_M = 5.0
 
 
+@final
 class VehicleLine:
     """The pilot's line, closed on leaving: a port may serve one client, and then another."""
 
@@ -30,7 +27,7 @@ class VehicleLine:
         self._link: MavlinkLink | None = None
         self._left = False
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> VehicleLine:
         """Return itself, not opened yet."""
         return self
 

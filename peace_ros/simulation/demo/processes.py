@@ -9,17 +9,13 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, final
 
 from peace_ros.core.domain import PeaceError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from typing_extensions import Self
 
 _INTERRUPT_S = 3.0
 """How long a process may take to end after SIGINT, and again after SIGTERM."""
@@ -37,6 +33,7 @@ class _Running:
     log: Path
 
 
+@final
 class ProcessGroup:
     """Start modules as processes of their own process groups; stop them all on leaving."""
 
@@ -46,7 +43,7 @@ class ProcessGroup:
         self._running: list[_Running] = []
         self._files = ExitStack()
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> ProcessGroup:
         """Return itself."""
         return self
 

@@ -6,19 +6,15 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import final
 
+from rich.console import Console
 from rich.live import Live
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rich.console import Console
-    from typing_extensions import Self
 
 _REFRESH_S = 0.25
 _LINE_S = 1.0
@@ -57,6 +53,7 @@ class Snapshot:
         return f'{self.phase}: {told}' if told else self.phase
 
 
+@final
 class Progress:
     """Shows snapshots from a thread of its own until it is left."""
 
@@ -77,7 +74,7 @@ class Progress:
             self._live = Live(console=console, auto_refresh=False, transient=True)
         self._thread = threading.Thread(target=self._run, name='progress', daemon=True)
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> Progress:
         """Begin to show."""
         if self._live is not None:
             self._live.start()

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.table import Table
 from rich.text import Text
@@ -22,10 +21,8 @@ from peace_ros.recording import (
     draw_trajectory,
     save_picture,
 )
-
-if TYPE_CHECKING:
-    from peace_ros.simulation.demo.history import History, StateSpan
-    from peace_ros.simulation.demo.summary import Summary, Truth
+from peace_ros.simulation.demo.history import History, StateSpan
+from peace_ros.simulation.demo.summary import Summary, Truth
 
 _MOST_MOMENTS = 18
 _MOST_VISITS = 10

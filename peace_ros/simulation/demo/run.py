@@ -9,7 +9,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from rich.console import Console
 
 from peace_ros.core.domain import PeaceError, VehicleError
 from peace_ros.core.landing import LandingParameters
@@ -27,9 +28,6 @@ from peace_ros.simulation.demo.report import draw_pictures, headline, summary_ta
 from peace_ros.simulation.demo.signals import interruptible
 from peace_ros.simulation.demo.summary import Ending, Setting, Summary, Truth, summarise
 from peace_ros.simulation.demo.worlds import DemoWorld, prepare_world
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 START_ALTITUDE_M = 100.0

@@ -8,15 +8,13 @@ import json
 from dataclasses import asdict, dataclass
 from math import hypot
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from peace_ros.core.domain import Pose
 from peace_ros.recording.run_folder import write_whole
 from peace_ros.simulation.camera import NadirCamera
+from peace_ros.simulation.demo.history import History
 from peace_ros.simulation.demo.truth import NO_TRUTH, GroundVerdict, judge
-
-if TYPE_CHECKING:
-    from peace_ros.simulation.demo.history import History
 
 OUTCOMES = ('handover', 'no_zone', 'timeout', 'battery', 'aborted', 'error')
 _MIRROR_SAMPLES = 100

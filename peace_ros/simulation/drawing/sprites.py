@@ -70,35 +70,41 @@ class _Sketch:
         cv2.fillPoly(self.image, [points], (grey, paint, 1.0, height), cv2.LINE_8, 5)
 
 
-def _car(cabin: tuple[float, float], height: float) -> FloatImage:
-    s = _Sketch(112, 44)
-    front, rear = cabin
-    s.box(0.0, 1.0, 0.02, 0.98, 0, 0.92, height * 0.55, 0.06)
-    s.box(0.03, 0.97, 0.10, 0.90, 0, 1.0, height * 0.6, 0.05)
-    s.box(rear - 0.07, front + 0.14, 0.09, 0.91, 46, 0.08, height * 0.75, 0.05)
-    s.box(rear, front, 0.14, 0.86, 0, 1.08, height, 0.02)
-    s.box(0.975, 0.998, 0.10, 0.24, 220, 0.1, 0.6)
-    s.box(0.975, 0.998, 0.76, 0.90, 220, 0.1, 0.6)
+def _boxes(columns: int, rows: int, *boxes: tuple[float, ...]) -> FloatImage:
+    """Draw rectangles one over the other; each holds the arguments of :meth:`_Sketch.box`."""
+    s = _Sketch(columns, rows)
+    for box in boxes:
+        s.box(*box)
     return s.image
+
+
+def _car(front: float, rear: float, height: float) -> FloatImage:
+    return _boxes(
+        112, 44,
+        (0.0, 1.0, 0.02, 0.98, 0, 0.92, height * 0.55, 0.06),
+        (0.03, 0.97, 0.10, 0.90, 0, 1.0, height * 0.6, 0.05),
+        (rear - 0.07, front + 0.14, 0.09, 0.91, 46, 0.08, height * 0.75, 0.05),
+        (rear, front, 0.14, 0.86, 0, 1.08, height, 0.02),
+        (0.975, 0.998, 0.10, 0.24, 220, 0.1, 0.6),
+        (0.975, 0.998, 0.76, 0.90, 220, 0.1, 0.6),
+    )  # fmt: skip
 
 
 def _truck() -> FloatImage:
-    s = _Sketch(220, 62)
-    s.box(0.78, 1.0, 0.05, 0.95, 0, 0.9, 2.8, 0.02)
-    s.box(0.93, 0.98, 0.10, 0.90, 44, 0.05, 2.2)
-    s.box(0.0, 0.76, 0.0, 1.0, 205, 0.12, 3.4)
-    s.box(0.01, 0.75, 0.04, 0.96, 214, 0.14, 3.5)
-    return s.image
+    return _boxes(
+        220, 62,
+        (0.78, 1.0, 0.05, 0.95, 0, 0.9, 2.8, 0.02), (0.93, 0.98, 0.10, 0.90, 44, 0.05, 2.2),
+        (0.0, 0.76, 0.0, 1.0, 205, 0.12, 3.4), (0.01, 0.75, 0.04, 0.96, 214, 0.14, 3.5),
+    )  # fmt: skip
 
 
 def _bus() -> FloatImage:
-    s = _Sketch(300, 64)
-    s.box(0.0, 1.0, 0.0, 1.0, 0, 0.95, 3.1, 0.015)
-    s.box(0.02, 0.95, 0.08, 0.92, 150, 0.4, 3.2)
-    for x in (0.2, 0.5, 0.78):
-        s.box(x, x + 0.09, 0.3, 0.7, 120, 0.1, 3.4)
-    s.box(0.965, 0.995, 0.08, 0.92, 40, 0.05, 2.0)
-    return s.image
+    return _boxes(
+        300, 64,
+        (0.0, 1.0, 0.0, 1.0, 0, 0.95, 3.1, 0.015), (0.02, 0.95, 0.08, 0.92, 150, 0.4, 3.2),
+        *((x, x + 0.09, 0.3, 0.7, 120, 0.1, 3.4) for x in (0.2, 0.5, 0.78)),
+        (0.965, 0.995, 0.08, 0.92, 40, 0.05, 2.0),
+    )  # fmt: skip
 
 
 def _boat() -> FloatImage:
@@ -111,14 +117,12 @@ def _boat() -> FloatImage:
 
 
 def _digger() -> FloatImage:
-    s = _Sketch(200, 80)
-    s.box(0.0, 0.5, 0.02, 0.2, 60, 0.0, 0.9)
-    s.box(0.0, 0.5, 0.8, 0.98, 60, 0.0, 0.9)
-    s.box(0.02, 0.46, 0.15, 0.85, 0, 1.0, 2.4)
-    s.box(0.24, 0.46, 0.18, 0.45, 50, 0.1, 2.9)
-    s.box(0.44, 0.88, 0.55, 0.68, 0, 0.9, 3.0)
-    s.box(0.86, 1.0, 0.42, 0.82, 70, 0.2, 1.2)
-    return s.image
+    return _boxes(
+        200, 80,
+        (0.0, 0.5, 0.02, 0.2, 60, 0.0, 0.9), (0.0, 0.5, 0.8, 0.98, 60, 0.0, 0.9),
+        (0.02, 0.46, 0.15, 0.85, 0, 1.0, 2.4), (0.24, 0.46, 0.18, 0.45, 50, 0.1, 2.9),
+        (0.44, 0.88, 0.55, 0.68, 0, 0.9, 3.0), (0.86, 1.0, 0.42, 0.82, 70, 0.2, 1.2),
+    )  # fmt: skip
 
 
 def _person(stride: float) -> FloatImage:
@@ -131,20 +135,15 @@ def _person(stride: float) -> FloatImage:
     return s.image
 
 
-def _box(height: float, ribs: int) -> FloatImage:
-    s = _Sketch(150, 62)
-    s.box(0.0, 1.0, 0.0, 1.0, 0, 0.95, height)
-    for x in np.linspace(0.0, 1.0, ribs + 1)[:-1]:
-        s.box(x, x + 0.35 / ribs, 0.03, 0.97, 0, 1.06, height)
-    return s.image
+def _ribbed(height: float, ribs: int) -> FloatImage:
+    starts = np.linspace(0.0, 1.0, ribs + 1)[:-1]
+    strips = ((x, x + 0.35 / ribs, 0.03, 0.97, 0, 1.06, height) for x in starts)
+    return _boxes(150, 62, (0.0, 1.0, 0.0, 1.0, 0, 0.95, height), *strips)
 
 
 def _table() -> FloatImage:
-    s = _Sketch(52, 44)
-    s.box(0.0, 1.0, 0.0, 0.18, 0, 0.8, 0.45)
-    s.box(0.0, 1.0, 0.82, 1.0, 0, 0.8, 0.45)
-    s.box(0.05, 0.95, 0.3, 0.7, 0, 1.0, 0.75)
-    return s.image
+    benches = ((0.0, 1.0, y, y + 0.18, 0, 0.8, 0.45) for y in (0.0, 0.82))
+    return _boxes(52, 44, *benches, (0.05, 0.95, 0.3, 0.7, 0, 1.0, 0.75))
 
 
 def _parasol() -> FloatImage:
@@ -176,18 +175,18 @@ def _pole() -> FloatImage:
 def _sprites() -> dict[str, list[FloatImage]]:
     """Return each sprite as a pyramid, finest first."""
     base = {
-        'car': _car((0.58, 0.22), 1.45),
-        'saloon': _car((0.56, 0.28), 1.4),
-        'estate': _car((0.58, 0.10), 1.5),
-        'van': _car((0.74, 0.06), 2.0),
+        'car': _car(0.58, 0.22, 1.45),
+        'saloon': _car(0.56, 0.28, 1.4),
+        'estate': _car(0.58, 0.10, 1.5),
+        'van': _car(0.74, 0.06, 2.0),
         'truck': _truck(),
         'bus': _bus(),
         'boat': _boat(),
         'digger': _digger(),
         'person': _person(0.0),
         'walker': _person(0.16),
-        'container': _box(2.5, 14),
-        'crate': _box(1.2, 3),
+        'container': _ribbed(2.5, 14),
+        'crate': _ribbed(1.2, 3),
         'table': _table(),
         'parasol': _parasol(),
         'trampoline': _ring(0.42, 0.8),

@@ -5,17 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import Frame, Prompt
 from peace_ros.core.inference.contract import NEGATIVE, PIXEL_VALUES, POSITIVE, SOFTMAX_POSITIVE
+from peace_ros.core.prompting.generator import Encoder
 from peace_ros.core.segmentation import FUSIONS, ClipSegSegmenter
-
-if TYPE_CHECKING:
-    from peace_ros.core.prompting.generator import Encoder
 
 _OUTPUTS = (POSITIVE, NEGATIVE, SOFTMAX_POSITIVE)
 _Scores = NDArray[np.float32]

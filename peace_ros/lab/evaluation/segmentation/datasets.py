@@ -18,7 +18,7 @@ from peace_ros.lab.evaluation.segmentation.classes import (
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError
 from peace_ros.lab.evaluation.segmentation.samples import (
     SampleSource,
-    mixed_remark,
+    mixed_remarks,
     paired,
 )
 from peace_ros.simulation.rasters import IMAGE_SUFFIXES
@@ -46,21 +46,14 @@ def dataset_source(name: str, root: Path, split: str, mixed: str) -> SampleSourc
         raise DatasetError(f'--root {root} is not a folder: give the one that holds {name}')
     layout, images = _find(content, root, path)
     chosen = _of_split(images, content, root, split, path)
-    labels = {image: _label_of(image, layout) for image in chosen}
-    samples, skipped = paired(
-        (
-            (
-                str(image.relative_to(root)),
-                image,
-                label if label.is_file() else None,
-                f'no label: {label} does not exist',
-            )
-            for image, label in labels.items()
-        ),
-        table.converter(layout['masks'], mixed),
-    )
+    pairs: list[tuple[str, Path, Path | None, str]] = []
+    for image in chosen:
+        label, name = _label_of(image, layout), str(image.relative_to(root))
+        there = label if label.is_file() else None
+        pairs.append((name, image, there, f'no label: {label} does not exist'))
+    samples, skipped = paired(pairs, table.converter(layout['masks'], mixed))
     title = f'{content.get("title", name)}{f", {split}" if split else ""}'
-    remarks = [mixed_remark(each.name, mixed) for each in table.entries if each.side == 'mixed']
+    remarks = [*mixed_remarks(table, mixed)]
     if not table.has_safe(mixed):
         remarks.append(
             f'{title} then has no safe ground: recall and IoU of safe mean nothing, the shares of '

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from peace_ros.core.domain import Label
 from peace_ros.lab.evaluation.segmentation.classes import (
+    ClassTable,
     Converter,
     dataset_names,
     find_table,
@@ -155,14 +156,9 @@ def paired(
     pairs: Iterable[tuple[str, Path, Path | None, str]], convert: Converter
 ) -> tuple[tuple[Sample, ...], list[Skipped]]:
     """Return samples, and what has no label, of (name, image, label, reason for no label)."""
-    samples: list[Sample] = []
-    skipped = []
-    for name, image, label, reason in pairs:
-        if label is None:
-            skipped.append(Skipped(name, reason))
-        else:
-            samples.append(FileSample(name, image, label, convert))
-    return tuple(samples), skipped
+    found = list(pairs)
+    samples = tuple(FileSample(name, image, at, convert) for name, image, at, _ in found if at)
+    return samples, [Skipped(name, reason) for name, _, at, reason in found if at is None]
 
 
 def folder_source(images: Path, labels: Path, classes: str, mixed: str) -> SampleSource:
@@ -217,17 +213,10 @@ def manifest_source(manifest: Path, split: str, classes: str, mixed: str) -> Sam
         )
     convert, remarks = _converter(classes, mixed)
     folder, reason = manifest.parent, 'no label in the manifest'
+    labels = [folder / row['label'] if row['label'] else None for row in chosen]
+    names = [row['image'] for row in chosen]
     samples, skipped = paired(
-        (
-            (
-                row['image'],
-                folder / row['image'],
-                folder / row['label'] if row['label'] else None,
-                reason,
-            )
-            for row in chosen
-        ),
-        convert,
+        ((name, folder / name, at, reason) for name, at in zip(names, labels, strict=True)), convert
     )
     return SampleSource(
         f'{manifest}{f", split {split}" if split else ""}',
@@ -247,23 +236,24 @@ def _looks_of(datasets: set[str]) -> int:
     return whole_number(read_yaml(path), 'max_looks', 1, path) or 0
 
 
-def mixed_remark(name: str, mixed: str) -> str:
-    """Return the sentence about classes that hold safe and unsafe ground alike."""
+def mixed_remarks(table: ClassTable, mixed: str) -> tuple[str, ...]:
+    """Return the sentences about classes that hold safe and unsafe ground alike."""
     told = {
         'ignore': 'is not counted',
         'safe': 'counts as safe, trees and roads in it too',
         'unsafe': 'counts as unsafe, lawn in it too',
-    }
-    return f'class {name} holds safe and unsafe ground alike and {told[mixed]} (--mixed {mixed})'
+    }[mixed]
+    return tuple(
+        f'class {each.name} holds safe and unsafe ground alike and {told} (--mixed {mixed})'
+        for each in table.entries
+        if each.side == 'mixed'
+    )
 
 
 def _converter(classes: str, mixed: str) -> tuple[Converter, tuple[str, ...]]:
     path = find_table(classes)
     table = parse_classes(read_yaml(path), str(path))
-    remarks = tuple(
-        mixed_remark(each.name, mixed) for each in table.entries if each.side == 'mixed'
-    )
-    return table.converter(table.masks(), mixed), remarks
+    return table.converter(table.masks(), mixed), mixed_remarks(table, mixed)
 
 
 def _images(paths: Iterable[Path]) -> list[Path]:

@@ -11,8 +11,9 @@ from torch import Tensor, nn
 
 from peace_ros.core.inference.contract import IMAGE_EMBEDDING, PIXEL_VALUES, PREDICTIONS, PROTOTYPES
 from peace_ros.core.inference.manifest import InputSpec
+from peace_ros.lab.export.graphs import write_graph
 from peace_ros.lab.training.backbone import MEAN, STD
-from peace_ros.lab.training.export import export_graph, export_text, write_trained_manifest
+from peace_ros.lab.training.export import finish_bundle
 from peace_ros.lab.training.instances import networks
 from peace_ros.lab.training.instances.batches import CROP_INPUT
 from peace_ros.lab.training.networks import Pair
@@ -50,27 +51,20 @@ def export_instances(
 ) -> None:  # fmt: skip
     """Write the bundle; ``shift`` as in :class:`SegmenterGraph`."""
     folder.mkdir(parents=True, exist_ok=True)
-    export_graph(
-        SegmenterGraph(network, shift),
-        (torch.zeros(1, 3, networks.INPUT_PX, networks.INPUT_PX),),
-        folder / 'segmenter.onnx',
-        (PIXEL_VALUES,),
-        (PREDICTIONS, PROTOTYPES),
-        halve=halve,
-    )
-    export_graph(
+    pixels = torch.zeros(1, 3, networks.INPUT_PX, networks.INPUT_PX)
+    path, outputs = folder / 'segmenter.onnx', (PREDICTIONS, PROTOTYPES)
+    write_graph(SegmenterGraph(network, shift), (pixels,), path, (PIXEL_VALUES,), outputs)
+    write_graph(
         matcher.image,
         (torch.zeros(2, 3, networks.CROP_PX, networks.CROP_PX),),
         folder / 'image_encoder.onnx',
         (PIXEL_VALUES,),
         (IMAGE_EMBEDDING,),
         {PIXEL_VALUES: {0: 'B'}, IMAGE_EMBEDDING: {0: 'B'}},
-        halve=halve,
     )
-    export_text(matcher.text, folder, halve=halve)
     whole = InputSpec(networks.INPUT_PX, networks.INPUT_PX, 'letterbox', MEAN, STD)
-    write_trained_manifest(
-        folder, 'fastsam', {'input': whole, 'crop_input': CROP_INPUT},
+    finish_bundle(
+        folder, matcher.text, 'fastsam', {'input': whole, 'crop_input': CROP_INPUT}, halve=halve,
         logit_scale=float(matcher.scale().detach()), provenance=provenance,
         recommended=recommended or {},
     )  # fmt: skip
