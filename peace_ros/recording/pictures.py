@@ -65,7 +65,7 @@ class TrajectoryScene:
     """What the panel says under the title."""
 
 
-class _View:
+class _MapView:
     """A square of the world, drawn north up at ``_MAP_PX``; ground beyond the world mirrored."""
 
     def __init__(self, scene: TrajectoryScene) -> None:
@@ -121,7 +121,7 @@ def draw_trajectory(scene: TrajectoryScene) -> Image:
     """
     if not scene.track:
         raise RecordingError('a trajectory of 0 points cannot be drawn: no pose was recorded')
-    view = _View(scene)
+    view = _MapView(scene)
     ground = view.picture(scene.world_rgb, scene.gsd_m)
     _draw_world_edge(ground, view, scene)
     _draw_path(ground, view, scene)
@@ -133,7 +133,7 @@ def draw_trajectory(scene: TrajectoryScene) -> Image:
     return np.hstack([ground, panel])
 
 
-def _draw_world_edge(ground: Image, view: _View, scene: TrajectoryScene) -> None:
+def _draw_world_edge(ground: Image, view: _MapView, scene: TrajectoryScene) -> None:
     height, width = scene.world_rgb.shape[:2]
     half_e, half_n = width * scene.gsd_m / 2, height * scene.gsd_m / 2
     corners = (view.pixel(-half_e, half_n), view.pixel(half_e, -half_n))
@@ -146,7 +146,7 @@ def _altitude_range(scene: TrajectoryScene) -> tuple[float, float]:
     return 0.0, max(20.0, 10.0 * ceil(highest / 10.0))
 
 
-def _draw_path(ground: Image, view: _View, scene: TrajectoryScene) -> None:
+def _draw_path(ground: Image, view: _MapView, scene: TrajectoryScene) -> None:
     pixels = [view.pixel(point.east_m, point.north_m) for point in scene.track]
     altitudes = np.array([point.altitude_agl_m for point in scene.track])
     colours = canvas.altitude_colours(altitudes, *_altitude_range(scene))
@@ -157,7 +157,7 @@ def _draw_path(ground: Image, view: _View, scene: TrajectoryScene) -> None:
         cv2.line(ground, begin, end, shade, 5, cv2.LINE_AA)
 
 
-def _draw_places(ground: Image, view: _View, scene: TrajectoryScene) -> None:
+def _draw_places(ground: Image, view: _MapView, scene: TrajectoryScene) -> None:
     for number, site in enumerate(scene.sites):
         last = number == len(scene.sites) - 1
         at = view.pixel(site.east_m, site.north_m)
@@ -199,7 +199,7 @@ def _verdict_colour(safe: bool | None) -> canvas.Colour:
     return canvas.GOOD if safe else canvas.BAD
 
 
-def _draw_panel(panel: Image, view: _View, scene: TrajectoryScene) -> None:
+def _draw_panel(panel: Image, view: _MapView, scene: TrajectoryScene) -> None:
     y = 44
     for line in canvas.wrap(scene.title, _PANEL_PX - 48, 0.75):
         canvas.put_text(panel, line, (24, y), scale=0.75, thickness=2)
@@ -278,7 +278,7 @@ def _draw_profile(panel: Image, at: Point, size: Point, scene: TrajectoryScene) 
     canvas.put_text(panel, end, (left, y + height + 18), scale=0.42)
 
 
-def _draw_inset(panel: Image, view: _View, scene: TrajectoryScene, top: int) -> None:
+def _draw_inset(panel: Image, view: _MapView, scene: TrajectoryScene, top: int) -> None:
     """Show the whole world, small, with the frame of the map on it."""
     height, width = scene.world_rgb.shape[:2]
     room = min(_MAP_PX - top - 20, _PANEL_PX - 60)
