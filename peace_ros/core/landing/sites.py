@@ -47,7 +47,7 @@ class Search:
 
 
 @dataclass(frozen=True)
-class _Ground:
+class _JudgedGround:
     """A part of the map, judged."""
 
     layers: MapLayers
@@ -101,7 +101,7 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
         )
     for each in search.failed:
         inside &= ~layers.disc(each.north_m, each.east_m, each.radius_m)
-    ground = _Ground(layers, safe, clearance(safe, layers.cell_m))
+    ground = _JudgedGround(layers, safe, clearance(safe, layers.cell_m))
     kept = _keep(ground, search, inside, p)
     wide = inside & (ground.clearance_m >= search.required_clearance_m)
     if not wide.any():
@@ -131,7 +131,7 @@ def _highest(value: NDArray[np.float32], candidates: NDArray[np.bool_]) -> tuple
     return cast('tuple[int, int]', np.unravel_index(index, value.shape))
 
 
-def _merits(ground: _Ground, search: Search) -> Merits:
+def _merits(ground: _JudgedGround, search: Search) -> Merits:
     """Return the merits of every cell by itself, as seen from the vehicle."""
     layers, radius_m = ground.layers, search.required_clearance_m
     reach = ceil(radius_m / layers.cell_m)
@@ -161,7 +161,7 @@ def _with_shapes(merits: Merits, candidates: NDArray[np.bool_], cell_m: float) -
 
 
 def _keep(
-    ground: _Ground, search: Search, inside: NDArray[np.bool_], parameters: LandingParameters
+    ground: _JudgedGround, search: Search, inside: NDArray[np.bool_], parameters: LandingParameters
 ) -> tuple[float, float] | None:
     """Return where the present choice is now (north, east), None when it is lost.
 
@@ -190,7 +190,7 @@ def _keep(
     return None
 
 
-def _site_at(ground: _Ground, north_m: float, east_m: float) -> Site:
+def _site_at(ground: _JudgedGround, north_m: float, east_m: float) -> Site:
     layers = ground.layers
     cell = layers.cell_at(north_m, east_m) or (0, 0)
     radius = float(ground.clearance_m[cell])

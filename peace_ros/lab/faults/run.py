@@ -38,7 +38,7 @@ class Results:
     """Why faults are missing, empty when none are."""
 
 
-class _Worker:
+class _WorkerProcess:
     """One process of :mod:`peace_ros.lab.faults.worker`."""
 
     def __init__(self, number: int, folder: Path, world_folder: Path) -> None:
@@ -131,9 +131,9 @@ def run_faults(
         waiting.put(fault)
     results, lock, stop = Results(), threading.Lock(), threading.Event()
     # Started from this thread: the kernel ends them when the thread ends that started them.
-    workers = [_Worker(n + 1, folder, world_folder) for n in range(min(jobs, len(faults)))]
+    workers = [_WorkerProcess(n + 1, folder, world_folder) for n in range(min(jobs, len(faults)))]
 
-    def work(worker: _Worker) -> None:
+    def work(worker: _WorkerProcess) -> None:
         try:
             while not stop.is_set():
                 fault = waiting.get_nowait()
@@ -162,7 +162,7 @@ def run_faults(
     return results
 
 
-def _run(worker: _Worker, fault: Fault, stop: threading.Event) -> dict[str, Any]:
+def _run(worker: _WorkerProcess, fault: Fault, stop: threading.Event) -> dict[str, Any]:
     """Run a fault; when the worker fails, that is the fault's result."""
     try:
         return worker.run(fault, stop)

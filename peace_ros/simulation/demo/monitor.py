@@ -44,7 +44,7 @@ _CDR_STAMP = struct.Struct('<iI')
 
 
 @dataclass(frozen=True)
-class _Topic:
+class _RecordedTopic:
     name: str
     message: Any
     type_name: str
@@ -52,15 +52,17 @@ class _Topic:
 
 
 _RECORDED = (
-    _Topic('/camera_info', CameraInfo, 'sensor_msgs/msg/CameraInfo', qos.RESULT),
-    _Topic(PROMPT, DiagnosticArray, 'diagnostic_msgs/msg/DiagnosticArray', qos.RESULT),
-    _Topic(HEATMAP, Image, 'sensor_msgs/msg/Image', qos.IMAGE_IN),
-    _Topic('/overlay/compressed', CompressedImage, 'sensor_msgs/msg/CompressedImage', qos.IMAGE_IN),
-    _Topic(STATUS, DiagnosticArray, 'diagnostic_msgs/msg/DiagnosticArray', qos.RESULT),
-    _Topic('/landing/setpoint', TwistStamped, 'geometry_msgs/msg/TwistStamped', qos.RESULT),
-    _Topic('/landing/site', PointStamped, 'geometry_msgs/msg/PointStamped', qos.RESULT),
-    _Topic(POSE, PoseStamped, 'geometry_msgs/msg/PoseStamped', qos.POSE),
-    _Topic(CAMERA_POSE, PoseStamped, 'geometry_msgs/msg/PoseStamped', qos.POSE),
+    _RecordedTopic('/camera_info', CameraInfo, 'sensor_msgs/msg/CameraInfo', qos.RESULT),
+    _RecordedTopic(PROMPT, DiagnosticArray, 'diagnostic_msgs/msg/DiagnosticArray', qos.RESULT),
+    _RecordedTopic(HEATMAP, Image, 'sensor_msgs/msg/Image', qos.IMAGE_IN),
+    _RecordedTopic(
+        '/overlay/compressed', CompressedImage, 'sensor_msgs/msg/CompressedImage', qos.IMAGE_IN
+    ),
+    _RecordedTopic(STATUS, DiagnosticArray, 'diagnostic_msgs/msg/DiagnosticArray', qos.RESULT),
+    _RecordedTopic('/landing/setpoint', TwistStamped, 'geometry_msgs/msg/TwistStamped', qos.RESULT),
+    _RecordedTopic('/landing/site', PointStamped, 'geometry_msgs/msg/PointStamped', qos.RESULT),
+    _RecordedTopic(POSE, PoseStamped, 'geometry_msgs/msg/PoseStamped', qos.POSE),
+    _RecordedTopic(CAMERA_POSE, PoseStamped, 'geometry_msgs/msg/PoseStamped', qos.POSE),
 )
 
 
@@ -100,7 +102,7 @@ class Monitor(Listener):
         with self.lock:
             self.history.engaged_ns = self.clock_ns()
 
-    def _subscribe(self, topic: _Topic) -> None:
+    def _subscribe(self, topic: _RecordedTopic) -> None:
         handle = {
             PROMPT: self._on_prompt,
             HEATMAP: self._on_heatmap,

@@ -40,7 +40,7 @@ class Worker:
 def test_every_fault_is_run_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jobs: int
 ) -> None:
-    monkeypatch.setattr(run, '_Worker', Worker)
+    monkeypatch.setattr(run, '_WorkerProcess', Worker)
     told: list[str] = []
     results = run.run_faults(
         FAULTS, jobs, tmp_path, tmp_path, lambda name, row: told.append(name) if row else None
@@ -54,7 +54,7 @@ def test_every_fault_is_run_once(
 def test_a_worker_that_hangs_fails_its_fault_and_loses_no_row(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run, '_Worker', Worker)
+    monkeypatch.setattr(run, '_WorkerProcess', Worker)
     monkeypatch.setattr(Worker, 'hanging', FAULTS[3].name)
     results = run.run_faults(FAULTS, 1, tmp_path, tmp_path, lambda _name, _row: None)
     assert [row['name'] for row in results.rows] == [fault.name for fault in FAULTS[:4]]
