@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain.geometry import Quaternion, quaternion_from_euler, yaw_from_quaternion
 from peace_ros.core.domain.motion import Pose, Telemetry
-from peace_ros.core.vehicle.boots import BootClock, Moment
+from peace_ros.core.vehicle.boots import BootClock, BootMoment
 from peace_ros.core.vehicle.clock import TimeMap
 from peace_ros.core.vehicle.dialects import Dialect
 from peace_ros.core.vehicle.gnss import GnssWatch
@@ -221,12 +221,12 @@ class Assembler:
             return False
         before_ms = self._boots.newest_ms
         moment = self._boots.judge(boot_ms, steady_ns, self._heartbeat_ns)
-        if moment is Moment.DOUBTFUL:
+        if moment is BootMoment.DOUBTFUL:
             return True
-        if moment is Moment.REBOOTED:
+        if moment is BootMoment.REBOOTED:
             self.reboots += 1
             self._forget()
-        elif moment is Moment.STEPPED:
+        elif moment is BootMoment.STEPPED:
             self._follow_clock(boot_ms - before_ms)
         newest_ms = self._newest_boot_ms.get(kind, -1)
         self._newest_boot_ms[kind] = max(newest_ms, boot_ms)

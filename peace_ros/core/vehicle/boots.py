@@ -16,7 +16,7 @@ STEP_NS = 2_000_000_000
 """How long a clock that no reboot explains must be reported before it is used."""
 
 
-class Moment(Enum):
+class BootMoment(Enum):
     """What the time stamp of a message tells."""
 
     FITS = 'fits'
@@ -48,7 +48,7 @@ class BootClock:
         """The autopilot's clock, 0 before its first message."""
         return 0 if self._newest is None else self._newest[0]
 
-    def judge(self, boot_ms: int, steady_ns: int, heartbeat_ns: int | None) -> Moment:
+    def judge(self, boot_ms: int, steady_ns: int, heartbeat_ns: int | None) -> BootMoment:
         """Take a time stamp.
 
         Args:
@@ -60,21 +60,21 @@ class BootClock:
             self._run = None
             if self._newest is None or boot_ms > self._newest[0]:
                 self._newest = (boot_ms, steady_ns)
-            return Moment.FITS
+            return BootMoment.FITS
         if self._run is None or not _follows(self._run, boot_ms, steady_ns):
             self._run, self._count, self._begun_ns = (boot_ms, steady_ns), 1, steady_ns
             self._fits_reboot = boot_ms <= _reach_ms(self._newest[1], steady_ns)
-            return Moment.DOUBTFUL
+            return BootMoment.DOUBTFUL
         if boot_ms > self._run[0]:
             self._run, self._count = (boot_ms, steady_ns), self._count + 1
         if self._count < MESSAGES_TO_BELIEVE:
-            return Moment.DOUBTFUL
-        moment = Moment.FITS
+            return BootMoment.DOUBTFUL
+        moment = BootMoment.FITS
         if boot_ms < self._newest[0]:
             lasts = self._fits_reboot or steady_ns - self._begun_ns >= STEP_NS
             if not lasts or (heartbeat_ns or 0) < self._begun_ns:
-                return Moment.DOUBTFUL
-            moment = Moment.REBOOTED if self._fits_reboot else Moment.STEPPED
+                return BootMoment.DOUBTFUL
+            moment = BootMoment.REBOOTED if self._fits_reboot else BootMoment.STEPPED
         self._newest, self._run = self._run, None
         return moment
 
