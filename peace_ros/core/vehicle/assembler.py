@@ -27,7 +27,9 @@ MAX_POSES = 256
 ESTIMATOR_LIMIT_S = 3.0
 """Age at which the report of the position filter about itself is stale."""
 KNOWS_POSITION = mavlink.ESTIMATOR_POS_HORIZ_REL | mavlink.ESTIMATOR_POS_HORIZ_ABS
+GLOBAL_POSITION = mavlink.ESTIMATOR_POS_HORIZ_ABS
 GUESSES_POSITION = mavlink.ESTIMATOR_CONST_POS_MODE
+"""PX4 sets it for a vehicle at rest too, beside the bit of a global position, which it then has."""
 IN_ORDER = frozenset({'LOCAL_POSITION_NED', 'ATTITUDE', 'ATTITUDE_QUATERNION'})
 """Of these only the newest is used, in whatever order they are received."""
 NUMBERS = {
@@ -154,7 +156,8 @@ class Assembler:
     def position_problem(self, steady_ns: int) -> str:
         """Return why there is no position to fly by, empty when nothing speaks against it."""
         flags = self._estimator_flags(steady_ns)
-        if flags is not None and (not flags & KNOWS_POSITION or flags & GUESSES_POSITION):
+        guesses = flags is not None and flags & GUESSES_POSITION and not flags & GLOBAL_POSITION
+        if flags is not None and (not flags & KNOWS_POSITION or guesses):
             return (
                 f'the autopilot has no estimate of its position (filter flags 0x{flags:X}) and '
                 'refuses velocity set-points: it needs GNSS, external navigation or optical flow'

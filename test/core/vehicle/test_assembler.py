@@ -261,7 +261,10 @@ def test_a_jump_is_believed_after_two_seconds_when_a_person_flies(assembler):
     assert jump(assembler, mode=5) == pytest.approx(2.0, abs=0.2)
 
 
-@pytest.mark.parametrize(('flags', 'problem'), [(0x33F, False), (0x2D, False), (0xA5, True)])
+@pytest.mark.parametrize(
+    ('flags', 'problem'),
+    [(0x33F, False), (0x2D, False), (0xA5, True), (0x3FF, False), (0xAF, True)],
+)
 def test_the_filter_says_whether_there_is_a_position(assembler, flags, problem):
     assembler.take(position(), 0, 0)
     report = mavlink.MAVLink_ekf_status_report_message(flags, 0, 0, 0, 0, 0)

@@ -57,6 +57,7 @@ def test_an_altitude_that_froze_is_noticed_within_few_metres(speed: float) -> No
     assert 'told to sink' in watch.problem
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=8),
     st.floats(-0.3, 0.3),
