@@ -11,8 +11,9 @@ import re
 from dataclasses import replace
 from math import hypot, inf
 
-from peace_ros.core.domain import Pose, Telemetry
+from peace_ros.core.domain import Pose, Setpoint, Telemetry
 from peace_ros.core.landing.decision import Decision
+from peace_ros.core.landing.drift import Drift
 from peace_ros.core.landing.guard import Guard
 from peace_ros.core.landing.guidance import ExpandingSquare, over_site, velocity
 from peace_ros.core.landing.parameters import LandingParameters
@@ -51,6 +52,8 @@ class Helm:
     def _begin(self) -> None:
         self._guard = Guard(self._p)
         self._control = ControlWatch()
+        self._drift = Drift()
+        self._told = Setpoint(0)
         self._budget = Budget(self._p)
         self._home: Pose | None = None
         self._square: ExpandingSquare | None = None
@@ -124,7 +127,10 @@ class Helm:
         self._advance(situation, self._events(situation, bad_data))
         situation = replace(situation, search_target=self._search_target(situation))
         wish, note = velocity(self.state, situation, p)
+        self._drift.see(pose if self._engaged else None, self._told)
+        wish = self._drift.made_up(wish, self._lateral_limit_m_s(pose))
         setpoint, guard_notes = self._guard.limit(wish, situation)
+        self._told = setpoint
         relaxed = sighting.threshold < p.safety_threshold
         notes = [note, f'threshold relaxed to {sighting.threshold:.2f}' if relaxed else '']
         return Decision(
@@ -140,6 +146,10 @@ class Helm:
             time_in_state_s=self._time_in_state_s(now_ns),
             relaxed=relaxed,
         )
+
+    def _lateral_limit_m_s(self, pose: Pose | None) -> float:
+        high = pose is not None and at_safe_altitude(pose, self._p)
+        return self._p.lateral_speed_limit if high else self._p.landing_lateral_speed_limit
 
     def _time_in_state_s(self, now_ns: int) -> float:
         since_ns = now_ns if self._since_ns is None else self._since_ns

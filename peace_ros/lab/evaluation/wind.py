@@ -28,9 +28,11 @@ from peace_ros.core.domain import Camera, Heatmap, Pose, Setpoint, Site, Telemet
 from peace_ros.core.domain.geometry import ground_to_image
 from peace_ros.core.landing import Decision, LandingCore, LandingParameters, State
 from peace_ros.core.mapping import MapParameters
+from peace_ros.simulation.autopilot.estimate_errors import PX4_ERRORS, EstimateErrors
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import Mode
+from peace_ros.simulation.autopilot.personality import Kind, Personality
 from peace_ros.simulation.autopilot.physics import Physics
 
 ERROR_LIMIT_M = 1.5
@@ -98,16 +100,25 @@ class WindFlight:
         gust_m_s: Standard deviation of the gusts.
         seed: Of gusts, direction, place of the island and errors of the heatmaps.
         heatmap_hz: Heatmaps per second.
+        px4_errors: Above 0: fly as PX4, with so many times its measured errors.
     """
 
     def __init__(
-        self, wind_m_s: float, gust_m_s: float, seed: int, heatmap_hz: float = 5.0
+        self,
+        wind_m_s: float,
+        gust_m_s: float,
+        seed: int,
+        heatmap_hz: float = 5.0,
+        px4_errors: float = 0.0,
     ) -> None:
         self._random = np.random.default_rng(seed)
         self._seed, self._heatmap_s = seed, 1.0 / heatmap_hz
         way = float(self._random.uniform(0.0, 2.0 * pi))
         wind = (wind_m_s * cos(way), wind_m_s * sin(way))
-        self._flight = _flying(Physics(wind_to_m_s=wind, gust_m_s=gust_m_s, seed=seed))
+        physics = Physics(wind_to_m_s=wind, gust_m_s=gust_m_s, seed=seed)
+        kind = Kind.PX4 if px4_errors > 0.0 else Kind.ARDUPILOT
+        errors = EstimateErrors(PX4_ERRORS.times(px4_errors), seed)
+        self._flight = flying(physics, Personality(kind), errors)
         self._ground = self._painted()
         self._camera = Camera.from_degrees(_PIXELS, _PIXELS, 73)
         self._core = LandingCore(LandingParameters(), self._camera, MapParameters(map_size_m=160.0))
@@ -170,7 +181,7 @@ class WindFlight:
         return Pose(round(self._now_s * 1e9), north, east, down, q, -down)
 
     def _report(self) -> None:
-        velocity = self._flight.physics.velocity_ned_m_s
+        velocity = self._flight.velocity_m_s
         self._poses.append((self._now_s + _LINE_DELAY_S, self._pose(), velocity))
 
     def _look(self) -> None:
@@ -236,16 +247,23 @@ def to_and_fro_m(places_m: NDArray[np.float64]) -> float:
     return float(np.minimum(rise, fall).max())
 
 
-def _flying(physics: Physics) -> Flight:
-    """Return an autopilot that has hovered in this wind for a while, in GUIDED.
+def flying(
+    physics: Physics, personality: Personality | None = None, errors: EstimateErrors | None = None
+) -> Flight:
+    """Return an autopilot that has hovered in this wind for a while, in GUIDED or OFFBOARD.
+
+    Args:
+        physics: Of the vehicle, at rest on the ground.
+        personality: Which autopilot; None: ArduPilot.
+        errors: Of its estimates; None: none.
 
     Raises:
         VehicleError: it does not come into the air.
     """
-    flight = Flight(physics)
+    flight = Flight(physics, personality, errors=errors)
     while not flight.has_position:
         flight.step(_TICK_S)
-    flight.set_mode(Mode.GUIDED)
+    flight.set_mode(Mode.STABILIZE if flight.personality.is_px4 else Mode.GUIDED)
     flight.arm(force=True)
     flight.take_off(5.0)
     until_s = flight.time_s + _BOOT_S
@@ -256,8 +274,10 @@ def _flying(physics: Physics) -> Flight:
     physics.north_m = physics.east_m = 0.0
     physics.down_m = -START_M
     for mode in (Mode.BRAKE, Mode.GUIDED):
+        flight.take_velocity(_target(Setpoint(0)))
         flight.set_mode(mode)
         for _ in range(round(3.0 / _TICK_S)):
+            flight.take_velocity(_target(Setpoint(0)))
             flight.step(_TICK_S)
     return flight
 
@@ -268,13 +288,19 @@ def _target(setpoint: Setpoint) -> PositionTarget:
 
 
 def fly(
-    seeds: int, wind_m_s: float, gust_m_s: float, heatmap_hz: float = 5.0, *, tell: bool = False
+    seeds: int,
+    wind_m_s: float,
+    gust_m_s: float,
+    heatmap_hz: float = 5.0,
+    *,
+    px4_errors: float = 0.0,
+    tell: bool = False,
 ) -> list[Landed]:
     """Fly with each seed from 1 on."""
     flown: list[Landed] = []
     begun_s = monotonic()
     for seed in range(1, seeds + 1):
-        flown.append(WindFlight(wind_m_s, gust_m_s, seed, heatmap_hz).run())
+        flown.append(WindFlight(wind_m_s, gust_m_s, seed, heatmap_hz, px4_errors).run())
         if tell:
             sys.stderr.write(f'\r{seed} of {seeds} flights, {monotonic() - begun_s:.0f} s')
             sys.stderr.flush()
@@ -299,9 +325,14 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--wind', type=float, default=5.0, help='mean speed, m/s')
     parser.add_argument('--gust', type=float, default=1.5, help='standard deviation, m/s')
     parser.add_argument('--heatmaps', type=float, default=5.0, help='per second')
+    parser.add_argument(
+        '--px4-errors', type=float, default=0.0, help='as PX4, times its measured errors'
+    )
     parser.add_argument('--json', type=Path, help='write the flights to this file')
     given = parser.parse_args(args)
-    flown = fly(given.seeds, given.wind, given.gust, given.heatmaps, tell=True)
+    flown = fly(
+        given.seeds, given.wind, given.gust, given.heatmaps, px4_errors=given.px4_errors, tell=True
+    )
     if given.json is not None:
         given.json.write_text(json.dumps([asdict(each) for each in flown], indent=2) + '\n')
     good = sum(each.is_good for each in flown)

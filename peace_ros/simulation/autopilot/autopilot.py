@@ -13,6 +13,7 @@ from typing import final
 from peace_ros.core.domain.errors import VehicleError
 from peace_ros.core.domain.motion import Pose
 from peace_ros.simulation.autopilot.disturbance import Disturbance
+from peace_ros.simulation.autopilot.estimate_errors import ErrorSizes, EstimateErrors
 from peace_ros.simulation.autopilot.fault_port import FaultServer
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.modes import Result
@@ -223,7 +224,14 @@ class AutopilotSim:
             self._server.restart()
 
     def _boot(self, physics: Physics) -> Flight:
-        return Flight(physics, self._personality, self.parameters.home_altitude_msl_m)
+        p, measured = self.parameters, self._personality.errors
+        bias, noise = p.velocity_bias_m_s, p.position_noise_m
+        sizes = ErrorSizes(
+            velocity_bias_m_s=measured.velocity_bias_m_s if bias < 0.0 else bias,
+            position_noise_m=measured.position_noise_m if noise < 0.0 else noise,
+        )
+        errors = EstimateErrors(sizes, p.seed)
+        return Flight(physics, self._personality, p.home_altitude_msl_m, errors)
 
     def _note_altitude(self) -> None:
         altitude_m = -self._flight.physics.down_m

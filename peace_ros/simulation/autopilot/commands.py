@@ -14,6 +14,7 @@ from peace_ros.core.domain.geometry import rotation_matrix
 from peace_ros.simulation.autopilot.flight import FORCE_MAGIC, Flight
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import Mode, Result
+from peace_ros.simulation.autopilot.personality import NEEDS_RADIO
 
 Params = tuple[float, float, float, float, float, float, float]
 SET_EKF_SOURCE_SET = 42007
@@ -34,7 +35,10 @@ def run_command(flight: Flight, command: int, p: Params) -> Result:
 def _set_mode(flight: Flight, p: Params) -> Result:
     if not int(p[0]) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
         return Result.DENIED
-    return flight.set_mode(flight.personality.mode_of_command(p[1], p[2]))
+    mode = flight.personality.mode_of_command(p[1], p[2])
+    if flight.personality.is_px4 and mode in NEEDS_RADIO:
+        return flight.personality.refused
+    return flight.set_mode(mode)
 
 
 def _arm(flight: Flight, p: Params) -> Result:

@@ -9,8 +9,10 @@ the ground lies in ``texts`` until the server takes it.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from math import isfinite
 
+from peace_ros.simulation.autopilot.estimate_errors import EstimateErrors
 from peace_ros.simulation.autopilot.estimator import RECKONS_PX4_S, RECKONS_S, Estimator
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import RULES, LandedState, Mode, Result, Severity
@@ -19,7 +21,7 @@ from peace_ros.simulation.autopilot.personality import (
     SETPOINT_FRAMES_PX4,
     Personality,
 )
-from peace_ros.simulation.autopilot.physics import Physics
+from peace_ros.simulation.autopilot.physics import Physics, VelocityCommand
 from peace_ros.simulation.autopilot.steering import Steering
 
 AUTO_DISARM_S = 10.0
@@ -40,11 +42,13 @@ class Flight:
         physics: Physics,
         personality: Personality | None = None,
         ground_msl_m: float = 0.0,
+        errors: EstimateErrors | None = None,
     ) -> None:
         self.physics = physics
         self.personality = personality or Personality()
         self._ground_msl_m = ground_msl_m
         self.estimator = Estimator(RECKONS_PX4_S if self.personality.is_px4 else RECKONS_S)
+        self.errors = errors or EstimateErrors()
         self.time_s = 0.0
         self.mode = Mode.STABILIZE
         self.armed = False
@@ -56,13 +60,16 @@ class Flight:
         self.setpoints_refused = 0
         """Those of them that the mode or the frame left without effect."""
         self._setpoint_s: float | None = None
+        self._lost_offboard = False
+        """The present mode was chosen because the set-points stopped."""
         self._take_off_m = 0.0
         self.mode_changes = 0
         self.home_changes = 0
         self.home_m = (physics.north_m, physics.east_m, 0.0)
         """Launch point, local NED; set again at each arming."""
         self._last_position_m = self.home_m
-        self._steering = Steering(physics)
+        # A velocity set-point leaves PX4's position uncontrolled, also one of zero.
+        self._steering = Steering(physics, holds_point=not self.personality.is_px4)
         self._on_ground_s = 0.0
         self._armed_idle_s = 0.0
         self._next_prearm_text_s = 5.0
@@ -79,9 +86,18 @@ class Flight:
         """North, east, down as the filter estimates them."""
         if self.estimator.stale_position and not self.has_position:
             return self._last_position_m
-        offset = self.estimator.offset_m
-        truth = self._truth
-        return truth[0] + offset[0], truth[1] + offset[1], truth[2] + offset[2]
+        offset, wrong = self.estimator.offset_m, self.errors.position_m
+        north, east, down = self._truth
+        return north + offset[0] + wrong[0], east + offset[1] + wrong[1], down + offset[2]
+
+    @property
+    def velocity_m_s(self) -> tuple[float, float, float]:
+        """North, east, down as the filter estimates them."""
+        north, east, down = self.physics.velocity_ned_m_s
+        if self.physics.on_ground:
+            return north, east, down  # a filter knows when it is at rest
+        wrong = self.errors.velocity_m_s
+        return north + wrong[0], east + wrong[1], down
 
     @property
     def last_place_m(self) -> tuple[float, float, float]:
@@ -115,6 +131,7 @@ class Flight:
     def step(self, dt_s: float) -> None:
         """Advance the clock, the failsafes and the vehicle."""
         self.time_s += dt_s
+        self.errors.step(dt_s)
         failsafe = self.estimator.step(self.time_s)
         if self.has_position:
             self._last_position_m = self.position_m
@@ -129,8 +146,20 @@ class Flight:
         command = self._steering.command(
             dt_s, self.mode, armed=self.armed, landed=self.landed, has_position=self.has_position
         )
-        self.physics.step(dt_s, command)
+        self.physics.step(dt_s, self._as_estimated(command))
         self._feel_ground(dt_s)
+
+    def _as_estimated(self, command: VelocityCommand) -> VelocityCommand:
+        """Return what the vehicle really does: it flies by the velocity that it estimates.
+
+        Measured, PX4 v1.17-alpha: told 0.7 m/s it reports 0.45 m/s and hardly moves.
+        """
+        north, east = self.errors.velocity_m_s
+        return replace(
+            command,
+            v_north_m_s=command.v_north_m_s - north,
+            v_east_m_s=command.v_east_m_s - east,
+        )
 
     def set_mode(self, number: int) -> Result:
         """Change the mode for whoever asks: companion, ground station or switch."""
@@ -265,12 +294,20 @@ class Flight:
         return age_s is not None and age_s <= OFFBOARD_LOSS_S
 
     def _watch_offboard(self) -> None:
-        """PX4 gives the vehicle to the sticks when the set-points stop."""
-        if not (self.personality.is_px4 and self.armed and self.mode is Mode.GUIDED):
+        """PX4 without a radio returns when the set-points stop, and obeys again when they flow.
+
+        Measured, PX4 v1.17-alpha: set-points that came back during that RTL (3.08 s after a cut of
+        3 s) put it back into OFFBOARD without anybody asking.
+        """
+        if not (self.personality.is_px4 and self.armed):
             return
-        if not self._stream_flows():
+        flows = self._stream_flows()
+        if self.mode is Mode.GUIDED and not flows:
             self.say(Severity.CRITICAL, 'Failsafe activated: offboard control signal lost')
-            self._enter(Mode.LOITER if self.has_position else Mode.LAND)
+            self._enter(Mode.RTL if self.has_position else Mode.LAND)
+            self._lost_offboard = True
+        elif self.mode is Mode.RTL and self._lost_offboard and flows:
+            self._enter(Mode.GUIDED)
 
     def _take_off_by_mode(self) -> None:
         if self.mode is not Mode.TAKEOFF or not self.armed or self._steering.taking_off:
@@ -283,6 +320,7 @@ class Flight:
 
     def _enter(self, mode: Mode) -> None:
         self.mode = mode
+        self._lost_offboard = False
         self.mode_changes += 1
         self._steering.enter(mode, has_position=self.has_position)
 

@@ -76,7 +76,25 @@ class AutopilotParameters(ParameterSet):
     gust_m_s: float = parameter(
         0.0, 'Standard deviation of the gusts along each axis.', unit='m/s', low=0.0, high=5.0
     )
-    seed: int = parameter(0, 'Seed of the gusts.', low=0, high=2**31 - 1)
+    seed: int = parameter(
+        0, 'Seed of the gusts and of the errors of the estimates.', low=0, high=2**31 - 1
+    )
+    velocity_bias_m_s: float = parameter(
+        -1.0,
+        'Standard deviation of the error of the estimated velocity along each horizontal axis, '
+        'which the vehicle flies by; -1: as measured of this autopilot (0 for ArduPilot).',
+        unit='m/s',
+        low=-1.0,
+        high=2.0,
+    )
+    position_noise_m: float = parameter(
+        -1.0,
+        'Standard deviation of the error of the estimated position along each horizontal axis; '
+        '-1: as measured of this autopilot (0 for ArduPilot).',
+        unit='m',
+        low=-1.0,
+        high=5.0,
+    )
     speed: float = parameter(
         1.0, 'Simulated seconds per second of the wall clock.', low=0.1, high=50.0
     )

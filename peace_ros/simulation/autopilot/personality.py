@@ -12,13 +12,18 @@ from enum import Enum
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from peace_ros.simulation.autopilot.estimate_errors import PX4_ERRORS, ErrorSizes
 from peace_ros.simulation.autopilot.modes import Mode, Result
 
 EKF_STATUS = 193
 ESTIMATOR_STATUS = 230
 SETPOINT_FRAMES_PX4 = frozenset({mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_BODY_NED})
-OFFBOARD_LOSS_S = 0.5
-"""Age of the newest set-point at which PX4 leaves OFFBOARD: fewer than 2 Hz are not enough."""
+OFFBOARD_LOSS_S = 1.05
+"""Age of the newest set-point at which PX4 leaves OFFBOARD (measured, PX4 v1.17-alpha: 1.05 to
+1.1 s)."""
+NEEDS_RADIO = frozenset({Mode.ALT_HOLD, Mode.LOITER, Mode.STABILIZE})
+"""Modes of the sticks: PX4 without a radio refuses them over MAVLink and stays where it is
+(measured, PX4 v1.17-alpha)."""
 
 PX4_NUMBERS: dict[Mode, tuple[int, int]] = {
     Mode.ALT_HOLD: (2, 0),
@@ -70,7 +75,7 @@ class Personality:
     @property
     def banner(self) -> str:
         """The first STATUSTEXT."""
-        return f'{"PX4 v1.15" if self.is_px4 else "ArduCopter V4.7.0"} (peace_ros simulation)'
+        return f'{"PX4 v1.17" if self.is_px4 else "ArduCopter V4.7.0"} (peace_ros simulation)'
 
     @property
     def refused(self) -> Result:
@@ -81,6 +86,11 @@ class Personality:
     def estimator_message(self) -> int:
         """Message id of the health of its filter; the other autopilot's is unknown to it."""
         return ESTIMATOR_STATUS if self.is_px4 else EKF_STATUS
+
+    @property
+    def errors(self) -> ErrorSizes:
+        """Measured errors of its estimates."""
+        return PX4_ERRORS if self.is_px4 else ErrorSizes()
 
     def custom_mode(self, mode: Mode) -> int:
         """Return custom_mode of HEARTBEAT."""

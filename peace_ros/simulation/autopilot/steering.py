@@ -40,10 +40,16 @@ THRUST_CLIMB_M_S = (-1.5, -0.7, 0.0, 1.2, 2.4)
 
 
 class Steering:
-    """Keeps what a mode must remember: targets, hold point, age of set-points."""
+    """Keeps what a mode must remember: targets, hold point, age of set-points.
 
-    def __init__(self, physics: Physics) -> None:
+    Args:
+        physics: Of the vehicle.
+        holds_point: In GUIDED, zero velocity means to come back when something pushes.
+    """
+
+    def __init__(self, physics: Physics, *, holds_point: bool = True) -> None:
         self._physics = physics
+        self._holds_point = holds_point
         self.stick_yaw_rate_rad_s = 0.0
         self._take_off_m: float | None = None
         self._spool_up_s = 0.0
@@ -140,7 +146,7 @@ class Steering:
         v: GuidedVelocity = self._velocity
         if self._velocity_age_s >= GUID_TIMEOUT_S:
             v = STOP
-        if v.v_north_m_s == v.v_east_m_s == v.v_down_m_s == 0.0:
+        if self._holds_point and v.v_north_m_s == v.v_east_m_s == v.v_down_m_s == 0.0:
             return replace(self._hold_point(), yaw_rad=v.yaw_rad, yaw_rate_rad_s=v.yaw_rate_rad_s)
         self._hold = None
         return VelocityCommand(

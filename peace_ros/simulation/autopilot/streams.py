@@ -101,7 +101,7 @@ class Streams:
         position_m = flight.position_m if at_m is None else at_m
         return (
             d.reported_position(position_m, self._parameters.home_altitude_msl_m),
-            d.reported_velocity(flight.physics.velocity_ned_m_s),
+            d.reported_velocity(flight.velocity_m_s),
         )
 
     def _boot_ms(self, flight: Flight) -> int:
@@ -267,9 +267,18 @@ def ekf_status(flight: Flight) -> Any:
 
 
 def estimator_status(flight: Flight) -> Any:
-    """Return ESTIMATOR_STATUS (PX4)."""
+    """Return ESTIMATOR_STATUS (PX4).
+
+    Measured, PX4 v1.17-alpha: 0x3FF at rest on the ground, with good GNSS. CONST_POS_MODE is set
+    for a vehicle at rest, beside POS_HORIZ_ABS.
+    """
+    flags = ekf_flags(flight)
+    if flight.has_position:
+        flags |= mavlink.ESTIMATOR_POS_VERT_AGL
+        if flight.landed:
+            flags |= mavlink.ESTIMATOR_CONST_POS_MODE
     return mavlink.MAVLink_estimator_status_message(
-        round(flight.time_s * 1e6), ekf_flags(flight), 0.1, 0.1, 0.1, 0.1, 0.0, 0.0, 0.5, 0.5
+        round(flight.time_s * 1e6), flags, 0.1, 0.1, 0.1, 0.1, 0.0, 0.0, 0.5, 0.5
     )
 
 

@@ -379,7 +379,8 @@ def test_a_jump_is_believed_after_two_seconds_when_a_person_flies(assembler):
 
 
 @pytest.mark.parametrize(
-    ('flags', 'problem'), [(0x33F, False), (0x2D, False), (0x3FF, False), (0xA5, True)]
+    ('flags', 'problem'),
+    [(0x33F, False), (0x2D, False), (0xA5, True), (0x3FF, False), (0xAF, True)],
 )
 def test_the_filter_says_whether_there_is_a_position(assembler, flags, problem):
     assembler.take(position(), 0, 0)

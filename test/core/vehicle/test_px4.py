@@ -45,7 +45,7 @@ def test_offboard_from_take_off_to_failsafe(px4, eventually):
     assert sim.truth().quaternion_ned_frd[3] == pytest.approx(heading_rad[3], abs=0.02)
 
     sender.stop()
-    assert eventually(lambda: link.telemetry().mode == 'POSCTL', 2.0)
+    assert eventually(lambda: link.telemetry().mode == 'AUTO.RTL', 3.0)
     assert link.taken_over, 'a failsafe is a takeover'
     assert any('offboard control signal lost' in text for text in link.status_texts())
     assert not link.request_control()
