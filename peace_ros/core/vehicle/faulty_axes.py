@@ -66,7 +66,7 @@ LEAST_PART = 0.2
 """A vehicle that shows this part of the way that it was told moves there, only slower."""
 
 
-class _Response:
+class _ExpectedMotion:
     """How fast a vehicle probably goes that follows what it is told."""
 
     def __init__(self) -> None:
@@ -109,7 +109,7 @@ class AxesWatch:
     """Looks at reported ways over ground for axes that are not north and east."""
 
     def __init__(self) -> None:
-        self._model = _Response()
+        self._model = _ExpectedMotion()
         self.restart()
 
     def restart(self) -> None:

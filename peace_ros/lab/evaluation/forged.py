@@ -60,7 +60,7 @@ class ForgedReport:
         return not self.tracebacks and not self.wrongly_believed
 
 
-class _Flight:
+class _ForgedFlight:
     """One flight: circles of 30 m, while the height changes between 20 and 60 m."""
 
     def __init__(self, rng: random.Random, report: ForgedReport, *, px4: bool) -> None:
@@ -272,7 +272,7 @@ def run_forged(messages: int, seed: int = 0) -> ForgedReport:
     report = ForgedReport()
     for number, first in enumerate(range(0, messages, FLIGHT)):
         rng = random.Random(f'{seed} {number}')
-        _Flight(rng, report, px4=bool(number % 2)).fly(min(FLIGHT, messages - first))
+        _ForgedFlight(rng, report, px4=bool(number % 2)).fly(min(FLIGHT, messages - first))
     report.kinds = dict(Counter(report.kinds).most_common())
     return report
 
