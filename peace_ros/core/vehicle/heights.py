@@ -78,7 +78,7 @@ class Height:
 def height_of(message: Any, steady_ns: int) -> Height | None:
     """Return the height in GLOBAL_POSITION_INT or ALTITUDE, None where there is none."""
     if message.get_type() == 'GLOBAL_POSITION_INT':
-        # The barometer's, also while latitude and longitude stand still for want of a position.
+        # The barometer's, also while latitude and longitude stand still without a position.
         above_m, climb_m_s = message.relative_alt / 1e3, -message.vz / 100.0
         return Height(steady_ns, message.time_boot_ms, above_m, climb_m_s)
     above_m = message.altitude_relative

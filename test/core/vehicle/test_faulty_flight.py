@@ -31,7 +31,7 @@ def test_a_line_that_comes_back_finds_the_mode_unchanged_and_goes_on(sent, event
     sender.submit(Setpoint(0, v_north_m_s=1.0))
     assert eventually(lambda: sim.flight.setpoints > 2)
     inject(sim, 'silence')
-    assert eventually(lambda: link.telemetry().pose is None, 2.0), 'hold for want of a position'
+    assert eventually(lambda: link.telemetry().pose is None, 2.0), 'hold without a position'
     assert eventually(lambda: sim.flight.setpoint_age_s > 3.5, 3.0)
     assert eventually(lambda: abs(sim.flight.physics.velocity_ned_m_s[0]) < 0.1, 3.0)
     assert link.telemetry().in_control, 'silence is no takeover'
