@@ -11,6 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'peace_ros'
+LINES_OF_WHAT_FLIES = 14_500
 LINES_OF_A_NODE_FILE = 200
 
 
@@ -20,6 +21,12 @@ def _lines(path: Path) -> int:
 
 def _relative(path: Path) -> str:
     return str(path.relative_to(ROOT))
+
+
+def test_what_flies_stays_small() -> None:
+    files = [*(PACKAGE / 'core').rglob('*.py'), *(PACKAGE / 'nodes').rglob('*.py')]
+    assert len(files) > 50
+    assert sum(map(_lines, files)) <= LINES_OF_WHAT_FLIES
 
 
 def test_a_file_of_a_node_is_read_at_one_sitting() -> None:

@@ -247,7 +247,7 @@ def test_a_position_that_comes_back_elsewhere_makes_the_map_worthless(
     shifts.set(1, 2, 1.0, 0.0, 0.75)
     shifts.set(1, 3, 2.0, 0.0, 0.75)
     trip.see(2)
-    assert trip.see(3, (12.0, 23.76)) == 'position is back, 3.8 m from where pictures led'
+    assert trip.see(3, (12.0, 23.76)) == 'position is back, 3.8 m from the estimate by pictures'
     assert not trip.carrier.is_carrying
     assert trip.see(4) == '', 'and the way is forgotten'
     assert not trip.carrier.is_carrying
@@ -268,9 +268,7 @@ def test_pictures_may_fail_for_a_second(trip: Trip, shifts: Shifts) -> None:
     trip.see(2)
     for number in range(3, 7):
         assert trip.see(number) == ''
-    assert trip.see(7) == (
-        f'no position, and pictures do not replace it: {Mismatch.DIFFERENT.value}'
-    )
+    assert trip.see(7) == (f'no position, and pictures do not give one: {Mismatch.DIFFERENT.value}')
     assert not trip.carrier.is_carrying
     assert trip.carrier.newest_ns is None
 

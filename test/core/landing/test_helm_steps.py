@@ -186,7 +186,7 @@ def test_a_takeover_aborts_for_good() -> None:
     steps.telemetry = replace(steps.telemetry, in_control=False, mode='LOITER')
     decision = steps.step(pose_of(30.0), site_at())
     assert decision.state is State.ABORTED
-    assert 'mode LOITER unasked' in decision.reason
+    assert 'mode LOITER without our request' in decision.reason
     assert decision.outcome == 'aborted'
     steps.telemetry = replace(steps.telemetry, in_control=True)
     assert steps.step(pose_of(30.0), site_at()).state is State.ABORTED
