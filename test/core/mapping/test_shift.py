@@ -153,6 +153,18 @@ def test_a_patch_shows_the_ground_north_up(pose: Pose, axis: int) -> None:
     assert found == pytest.approx(list(expected), abs=0.6)
 
 
+def test_a_patch_is_smoothed_a_little() -> None:
+    grey = np.zeros((256, 256), np.uint8)
+    grey[127:129, 127:129] = 200  # ground of 2 x 2 pixels, 1.7 x 1.7 cells
+    patch = steps._patch(View(grey, pose_of(30.0)), CAMERA, np.zeros(2), 28.0)
+    assert patch is not None
+    assert patch.dtype == np.float32
+    across, along = patch[63], patch[:, 63]
+    np.testing.assert_allclose(across, along, atol=0.5)
+    spread = np.sqrt(np.sum(along * (np.arange(128) - 63.5) ** 2) / along.sum())
+    assert spread == pytest.approx(1.25, abs=0.15)
+
+
 def test_a_patch_must_be_in_view_as_a_whole() -> None:
     view = view_of(texture(256, 256))
     width_m = 256.0 / CAMERA.focal_px * 30.0
@@ -205,8 +217,9 @@ def test_a_level_camera_moved_by_what_the_picture_moved(moved_px: tuple[int, int
     assert 0.9 < found.correlation <= 1.0
 
 
+@pytest.mark.parametrize('axis', ['roll', 'pitch'])
 @pytest.mark.parametrize('lean', [15.0, 24.0])
-def test_leaning_cameras_are_compared_around_what_both_see(lean: float) -> None:
+def test_leaning_cameras_are_compared_around_what_both_see(lean: float, axis: str) -> None:
     """Two that lean apart see little of the same ground below them; both stand still."""
     ground = texture(1200, 1200, 8)
     middle, px_per_m = 600.0, 6.0
@@ -221,7 +234,7 @@ def test_leaning_cameras_are_compared_around_what_both_see(lean: float) -> None:
             cv2.warpPerspective(ground, matrix, (256, 256), flags=flags).astype(np.uint8), pose
         )
 
-    found = register(seen(roll=lean), seen(roll=lean - 20.0, yaw=4.0), CAMERA)
+    found = register(seen(**{axis: lean}), seen(**{axis: lean - 20.0}, yaw=4.0), CAMERA)
     assert isinstance(found, Displacement)
     assert hypot(found.north_m, found.east_m) < found.error_m < 0.5
 

@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
-from peace_ros.core.mapping import MapParameters
+from peace_ros.core.domain import Camera, Heatmap, Pose
+from peace_ros.core.mapping import MapParameters, SafetyMap
 from peace_ros.core.mapping.projection import Window
 from peace_ros.core.mapping.veto import Veto, blobs
 
@@ -215,3 +217,58 @@ def test_a_window_is_a_part_of_the_map() -> None:
         [False, True],
         [False, False],
     ]
+
+
+S = 1_000_000_000
+CAMERA = Camera.from_degrees(64, 64, 73.0)
+ABOVE = Pose(0, 0.0, 0.0, -10.0, (1.0, 0.0, 0.0, 0.0), 10.0)
+
+
+def pixels(safety_map: SafetyMap) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the picture at the middles of cells."""
+    north, east = safety_map.layers(0).distances_m(0.0, 0.0)
+    px_per_m = CAMERA.focal_px / 10.0
+    return 31.5 - north * px_per_m + 0.0 * east, 31.5 + east * px_per_m + 0.0 * north
+
+
+@pytest.mark.parametrize(
+    ('rows', 'columns'), [(slice(20, 28), slice(36, 44)), (slice(0, 9), slice(30, 40))]
+)
+def test_a_blob_closes_the_ground_that_it_shows_and_no_border(rows: slice, columns: slice) -> None:
+    safety_map = SafetyMap(MapParameters(map_size_m=20.0))
+    safety = np.full((64, 64), 0.9, np.float32)
+    for number in range(2):
+        safety_map.add(Heatmap(safety, number * S), CAMERA, ABOVE)
+    before = safety_map.layers(S)
+    safety[rows, columns] = 0.05
+    count = safety_map.add(Heatmap(safety, 2 * S), CAMERA, ABOVE)
+    after = safety_map.layers(2 * S)
+    assert count == np.count_nonzero(after.looks == 3)
+    assert np.array_equal(after.looks > 0, before.looks > 0), 'the border is not believed'
+    v, u = pixels(safety_map)
+    # Grown by a pixel, which is half a cell.
+    depth = np.minimum(
+        np.minimum(v - (rows.start - 1.5), rows.stop + 0.5 - v),
+        np.minimum(u - (columns.start - 1.5), columns.stop + 0.5 - u),
+    )
+    clear = (np.abs(depth) > 0.1) & (after.looks > 0)
+    closed = after.score == 0.0
+    assert np.array_equal(closed[clear], (depth > 0.0)[clear])
+    assert np.count_nonzero(closed & (after.looks > 0)) > 10
+    assert after.score[(depth < -3.0) & (after.looks > 0)].min() > 0.8
+
+
+def test_closed_ground_grows_round_with_the_map() -> None:
+    safety_map = SafetyMap(MapParameters(map_size_m=20.0))
+    safety = np.full((64, 64), 0.9, np.float32)
+    safety_map.add(Heatmap(safety, 0), CAMERA, ABOVE)
+    safety[30:34, 30:34] = 0.05
+    safety_map.add(Heatmap(safety, S), CAMERA, ABOVE)
+    known = slice(12, 28), slice(12, 28)
+    before = (safety_map.layers(S).score[known] == 0.0).astype(np.uint8)
+    assert before.any()
+    safety_map.widen_unsafe(1.0)
+    disc = np.ones((5, 5), np.uint8)
+    disc[np.ix_([0, 4], [0, 1, 3, 4])] = 0
+    after = safety_map.layers(S).score[known] == 0.0
+    assert np.array_equal(after, cv2.dilate(before, disc) > 0)
