@@ -102,7 +102,8 @@ class _Still:
     def see(self, seen_m: NDArray[np.float64], way_m: float) -> None:
         if self._at_m is None or float(np.abs(seen_m - self._at_m).max()) > self._half_m:
             self._at_m, self.way_m = seen_m, 0.0
-        self.way_m += way_m
+        else:
+            self.way_m += way_m
 
 
 class AxesWatch:

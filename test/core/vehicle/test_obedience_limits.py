@@ -247,6 +247,15 @@ def test_the_way_is_that_of_the_clock_of_the_autopilot(rate: float) -> None:
     assert found is None
 
 
+def test_a_fast_vehicle_that_is_rarely_reported_does_not_stand_still() -> None:
+    found = noticed(
+        steady(5.0),
+        noisy(lambda at_s: (5.0 * max(0.0, at_s - 1.0), 0.0, -50.0)),
+        silent=lambda at_s: at_s % 0.4375 != 0.0,
+    )
+    assert found is None
+
+
 def test_a_position_that_runs_away_is_noticed() -> None:
     found = noticed(
         lambda at_s: (1.0, 0.0, 0.0),
