@@ -37,8 +37,8 @@ EVIDENCE = 14.0
 the measured size, 8 m/s of wind and gusts."""
 EVIDENCE_PER_S = 40.0
 """A gust may not convince at once."""
-DRIFT_LIMIT_M_S = 1.7
-"""A larger bias than this is none (five times the largest measured),"""
+DRIFT_LIMIT_M_S = 2.0
+"""A larger bias than this is none (six times the largest measured),"""
 DRIFT_M = 3.0
 """when over this way the position runs away from what was told."""
 EXPLANATIONS: dict[str, tuple[Plane, Plane]] = {
@@ -102,7 +102,8 @@ class _Still:
     def see(self, seen_m: NDArray[np.float64], way_m: float) -> None:
         if self._at_m is None or float(np.abs(seen_m - self._at_m).max()) > self._half_m:
             self._at_m, self.way_m = seen_m, 0.0
-        self.way_m += way_m
+        else:
+            self.way_m += way_m
 
 
 class AxesWatch:

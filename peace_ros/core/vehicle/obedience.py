@@ -80,7 +80,8 @@ class ObedienceWatch:
             position_m: None is unknown, and proves nothing.
             steady_ns: When it was reported.
             boot_ns: The same by the autopilot's clock, None: it runs as ours. In a simulation it
-                may run slower, and a slow descent is no lie then.
+                may run slower, and a slow descent is no lie then, or faster, and the vehicle goes
+                farther than it was told by our clock.
         """
         at_s = steady_ns / 1e9
         boot_s = at_s if boot_ns is None else boot_ns / 1e9
@@ -95,9 +96,10 @@ class ObedienceWatch:
             self._marks.clear()
             self._axes.restart()
             return
-        flown_s = 0.0
+        flown_s = boot_step_s = 0.0
         if last is not None:
-            flown_s = min(at_s - last.at_s, max(0.0, boot_s - last.boot_s))
+            boot_step_s = min(GAP_S, max(0.0, boot_s - last.boot_s))
+            flown_s = min(at_s - last.at_s, boot_step_s)
         north, east, down = self._velocity_m_s
         self._told_m += down * flown_s
         self._marks.append(_Mark(at_s, boot_s, position_m, self._told_m))
@@ -105,7 +107,7 @@ class ObedienceWatch:
             self._marks.popleft()
         for span_s in SPANS_S:
             self.problem = self.problem or self._sinks(at_s, span_s)
-        found = self._axes.take(position_m[:2], (north, east), flown_s)
+        found = self._axes.take(position_m[:2], (north, east), boot_step_s)
         self.problem = self.problem or (f'{found}: it {_REMEDY}' if found else '')
 
     def _sinks(self, at_s: float, span_s: float) -> str:

@@ -32,6 +32,8 @@ _TICK_S = 0.02
 _REPORT_S = 0.04
 _DELAY_S = 0.06
 """Age of a report when it is heard."""
+_STALL_SHARE, _STALL_S = 0.02, 0.45
+"""After so many reports none comes for so long, as on a busy machine."""
 _FLIGHT_S = 180.0
 _HOVER_S = 6.0
 _GUST_SHARE = 0.3
@@ -84,6 +86,7 @@ class WatchedFlight:
         physics = Physics(wind_to_m_s=wind, gust_m_s=_GUST_SHARE * wind_m_s, seed=seed)
         self.flight = flying(physics, Personality(kind), EstimateErrors(sizes, seed))
         self.watch = ObedienceWatch()
+        self._line = Random(seed)
         self.fault = ''
         self._fault_at_m: Plane = (0.0, 0.0)
         self._reports: deque[tuple[float, tuple[float, float, float]]] = deque()
@@ -114,7 +117,8 @@ class WatchedFlight:
         self.watch.tell(velocity)
         flight.step(_TICK_S)
         if flight.time_s + 1e-9 >= self._due_s:
-            self._due_s += _REPORT_S
+            stalls = self._line.random() < _STALL_SHARE
+            self._due_s += _STALL_S if stalls else _REPORT_S
             self._reports.append((flight.time_s, self.seen_m))
         while self._reports and self._reports[0][0] + _DELAY_S <= flight.time_s:
             at_s, seen_m = self._reports.popleft()

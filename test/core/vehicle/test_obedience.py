@@ -160,7 +160,7 @@ def towards(north_m: float, east_m: float) -> Callable[[float, Place], Place]:
     def told(_at_s: float, place: Place) -> Place:
         north, east = north_m - place[0], east_m - place[1]
         distance = hypot(north, east)
-        speed = min(1.0, 0.5 * distance)
+        speed = min(1.5, 0.5 * distance)
         return (
             (0.0, 0.0) if distance == 0.0 else (speed * north / distance, speed * east / distance)
         )

@@ -237,10 +237,29 @@ def test_a_vehicle_that_hardly_moves_for_its_bias_is_believed() -> None:
     assert noticed(told, noisy(reported)) is None
 
 
+@pytest.mark.parametrize('rate', [0.4, 1.0, 2.0])
+def test_the_way_is_that_of_the_clock_of_the_autopilot(rate: float) -> None:
+    found = noticed(
+        lambda _: (3.0, 0.0, 0.0),
+        noisy(lambda at_s: (3.0 * max(0.0, rate * at_s - 0.6), 0.0, -50.0)),
+        boot=lambda at_s: rate * at_s,
+    )
+    assert found is None
+
+
+def test_a_fast_vehicle_that_is_rarely_reported_does_not_stand_still() -> None:
+    found = noticed(
+        steady(5.0),
+        noisy(lambda at_s: (5.0 * max(0.0, at_s - 1.0), 0.0, -50.0)),
+        silent=lambda at_s: at_s % 0.4375 != 0.0,
+    )
+    assert found is None
+
+
 def test_a_position_that_runs_away_is_noticed() -> None:
     found = noticed(
         lambda at_s: (1.0, 0.0, 0.0),
-        noisy(lambda at_s: (-0.3 * at_s, -2.0 * at_s, -50.0)),
+        noisy(lambda at_s: (-0.3 * at_s, -2.5 * at_s, -50.0)),
     )
     assert found is not None
     assert found[0] < 6.0
