@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from peace_ros.core.vehicle.boots import BootClock, Moment
+from peace_ros.core.vehicle.boots import BootClock, BootMoment
 from peace_ros.core.vehicle.heights import HomeHeight
 from peace_ros.core.vehicle.trust import JumpWatch, Pairwise
 from peace_ros.lab.evaluation import forged
@@ -33,7 +33,7 @@ def test_nothing_that_a_single_message_introduced_is_believed(seed):
 )
 def test_a_guard_that_is_taken_away_is_noticed(monkeypatch, owner, name, what):
     def old_rule(_self, boot_ms, *_):
-        return Moment.REBOOTED if boot_ms < 1000 else Moment.FITS
+        return BootMoment.REBOOTED if boot_ms < 1000 else BootMoment.FITS
 
     def any_home(self, home_m, origin_m, told_m, **_how):
         self.home_msl_m, self._origin_msl_m, self._told_m = home_m, origin_m, told_m
