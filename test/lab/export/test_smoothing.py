@@ -136,7 +136,7 @@ def _fused_products(path: Path, folder: Path) -> int:
     """Return how many products ONNX Runtime really runs in int8, as the nodes open the file."""
     options = session._options(1, 'all')
     options.optimized_model_filepath = str(folder / 'optimised.onnx')
-    session._onnxruntime(path, options, [CPU])
+    session._OnnxRuntimeEngine(path, options, [CPU])
     nodes = onnx.load(str(folder / 'optimised.onnx')).graph.node
     return sum(node.op_type == 'MatMulIntegerToFloat' for node in nodes)
 
