@@ -118,7 +118,7 @@ def test_the_map_outlives_a_short_silence_of_the_position_but_not_a_long_one(int
 
 def test_attitude_without_position_places_nothing(intake, safety_map):
     for tick in range(21, 26):
-        intake.add_pose(replace(pose_of(0.1 * tick), north_m=nan, east_m=nan, down_m=nan))
+        intake.add_pose(replace(pose_of(0.1 * tick), north_m=nan, east_m=nan))
         intake.add_heatmap(heatmap_of(0.1 * tick))
         intake.tick(round(0.1 * tick * S))
     assert safety_map.stamp_ns == 2 * S

@@ -71,7 +71,7 @@ class Outage:
             pose = self.truth()
             told = pose
             if LOST_S < self.time_s < BACK_S:
-                told = replace(pose, north_m=nan, east_m=nan, down_m=nan)
+                told = replace(pose, north_m=nan, east_m=nan)
             elif self.time_s >= BACK_S:
                 told = replace(pose, north_m=pose.north_m + self.back_m)
             self.intake.add_pose(told)
