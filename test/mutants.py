@@ -52,7 +52,7 @@ GROUPS = {
     'landing': Group(
         ['core/landing/[!cs]*.py', 'core/landing/si*.py'],  # but core.py and states.py
         ['core/landing'],
-        ('flights', 'core', 'states', 'helm', 'odometry'),
+        ('flights', 'core', 'states'),
     ),
     'states': Group(['core/landing/states.py'], ['core/landing/test_states.py']),
     'core': Group(['core/landing/core.py'], ['core/landing/test_core.py']),

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from math import hypot
 
 import numpy as np
+from numpy.typing import NDArray
 
 from peace_ros.core.domain import Camera, Frame, Pose
 from peace_ros.core.domain.geometry import footprint_m
@@ -106,7 +107,7 @@ class PositionCarrier:
         self._odometry = VisualOdometry(camera)
         self._attitudes = PoseHistory(gap_limit_s)
         self._carried = PoseHistory(gap_limit_s)
-        self._pending: deque[tuple[int, View]] = deque(maxlen=_PENDING_LIMIT)
+        self._pending: deque[tuple[int, NDArray[np.uint8]]] = deque(maxlen=_PENDING_LIMIT)
         self._newest_view_ns = -1
         self._told_ns = 0
         self._widened_m = 0.0
@@ -141,8 +142,7 @@ class PositionCarrier:
         if frame.stamp_ns <= self._newest_view_ns:
             return False
         self._newest_view_ns = frame.stamp_ns
-        attitude = Pose(frame.stamp_ns, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 1.0)
-        self._pending.append((frame.stamp_ns, View(small_grey(frame.image_rgb), attitude)))
+        self._pending.append((frame.stamp_ns, small_grey(frame.image_rgb)))
         return True
 
     def at(self, stamp_ns: int) -> Pose | Miss:
@@ -155,7 +155,7 @@ class PositionCarrier:
         :return: why the map must be dropped, empty when it may stay.
         """
         while self._pending:
-            stamp_ns, view = self._pending[0]
+            stamp_ns, grey = self._pending[0]
             attitude = self._attitudes.at(stamp_ns)
             if attitude is Miss.NOT_YET:
                 return ''
@@ -164,9 +164,9 @@ class PositionCarrier:
                 continue
             position = positions.at(stamp_ns)
             if isinstance(position, Pose):
-                lost = self._come_back(View(view.grey, attitude), position)
+                lost = self._come_back(View(grey, attitude), position)
             else:
-                lost = self._carry_on(View(view.grey, attitude))
+                lost = self._carry_on(View(grey, attitude))
             if lost:
                 self.forget_way()
                 return lost

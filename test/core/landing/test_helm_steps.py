@@ -310,3 +310,52 @@ def test_failed_descents_are_counted_and_time_without_a_site_is_told() -> None:
     steps.helm.engage()
     assert steps.helm.attempts == 0
     assert steps.helm.without_site_s == 0.0
+
+
+def test_a_reason_is_told_as_it_began_while_only_its_numbers_change() -> None:
+    steps = Steps(state=State.LANDING)
+    steps.age_s = 0.8
+    first = steps.step(pose_of(30.0)).reason
+    assert 'telemetry is 0.8 s old' in first
+    steps.age_s = 12.3
+    assert steps.step(pose_of(30.0)).reason == first
+    steps.age_s = 0.1
+    assert 'heatmap is 9.9 s old' in steps.step(pose_of(30.0), map_age_s=9.9).reason
+    assert 'searching' in steps.step(pose_of(30.0), map_age_s=0.1).reason
+
+
+def led(
+    altitude_m: float, aside_m: float, bias_m_s: float, *, engaged: bool = True
+) -> tuple[float, float]:
+    """Hold the vehicle beside its site, drifting; return north and east speed at the end."""
+    steps = Steps(state=State.AIMING if engaged else None)
+    north = 0.0
+    for tick in range(300):
+        stamp_ns = round((steps.at_s + 0.1) * S)
+        pose = replace(pose_of(altitude_m, north), stamp_ns=stamp_ns)
+        decision = steps.step(pose, site_at(north + aside_m, 0.0, 40.0))
+        told = decision.setpoint.v_north_m_s
+        north += 0.1 * (told + bias_m_s)
+        if not engaged and tick == 280:
+            steps.helm.engage()
+    return decision.setpoint.v_north_m_s, decision.setpoint.v_east_m_s
+
+
+@pytest.mark.parametrize(
+    ('altitude_m', 'aside_m', 'bias_m_s', 'speed'),
+    [
+        # 0.35/s of the error (0.5/s low down), and all but 0.1 m/s of a drift of 0.5 m/s.
+        (60.0, 2.0, 0.0, 0.7),
+        (60.0, 2.0, 0.5, 0.3),
+        (60.0, 2.0, -0.5, 1.1),
+        (60.0, 20.0, -0.5, 5.0),
+        (40.0, 20.0, -0.5, 1.5),
+        (40.0, 2.0, -0.5, 1.4),
+    ],
+)
+def test_a_drift_is_made_up_for_up_to_the_limit_of_the_altitude(
+    altitude_m: float, aside_m: float, bias_m_s: float, speed: float
+) -> None:
+    north, east = led(altitude_m, aside_m, bias_m_s)
+    assert north == pytest.approx(speed, abs=0.03)
+    assert east == pytest.approx(0.0, abs=1e-6)

@@ -434,3 +434,37 @@ def test_of_depth_only_the_newest_wait(intake: Intake) -> None:
     assert 1 < waiting < 40
     intake.poses(2.1, 2.6)
     assert intake.counts == {'depth used': waiting}
+
+
+def test_each_drop_of_the_map_is_counted(intake: Intake) -> None:
+    north_m, time_s = 0.0, 2.0
+    for number in range(3):
+        intake.heatmap(time_s - 0.05, PICTURE[:32, :32] - 0.01 * number)
+        north_m, time_s = north_m + 30.0, time_s + 0.1
+        intake.intake.add_pose(pose_of(time_s, north_m))
+        intake.poses(time_s + 0.1, time_s + 0.3, north_m)
+        time_s += 0.3
+    assert intake.intake.drops == 3
+    assert intake.counts['map dropped'] == 3
+    assert intake.intake.last_rejection.startswith('the position jumped by 30.0 m')
+
+
+def test_stamps_begin_at_zero() -> None:
+    intake = Intake()
+    intake.intake.add_pose(pose_of(0.0))
+    intake.heatmap(0.0)
+    intake.depth(0.0)
+    assert intake.counts == {'used': 1, 'depth used': 1}
+    intake.intake.clear()
+    intake.map.clear()
+    intake.intake.add_pose(pose_of(0.0))
+    intake.depth(0.0)
+    assert intake.counts['depth used'] == 2
+
+
+def test_a_stuck_picture_is_rejected_with_its_reason(intake: Intake) -> None:
+    intake.heatmap(1.5)
+    intake.poses(2.1, 2.5, 2.0)
+    intake.heatmap(2.4)
+    assert intake.counts == {'used': 1, STUCK: 1}
+    assert intake.intake.last_rejection == STUCK
