@@ -7,7 +7,7 @@
 
 Takes hours, so no check runs it; docs/testing.md holds the figures. Needs the extras `test` and
 `mutation`. Works on a copy of the checkout in build/mutants/GROUP. What was killed there stands
-until its function changes; what survived runs again when a test has changed.
+until its function changes; what survived runs again when any code has changed.
 """
 
 from __future__ import annotations
@@ -82,6 +82,8 @@ def run(name: str, children: int) -> None:
     """Run what has not run yet of a group."""
     group, copy = GROUPS[name], COPIES / name
     if _copy_checkout(copy):
+        # Which tests come by which function is found out anew.
+        (copy / 'mutants' / 'mutmut-stats.json').unlink(missing_ok=True)
         _change_results(copy, lambda _module, _mutant, code: code in {SURVIVED, NO_TESTS}, None)
     settings = {
         'source_paths': ['peace_ros'],
@@ -94,7 +96,8 @@ def run(name: str, children: int) -> None:
             *('-p', 'no:xdist', '-p', 'no:cacheprovider'),
             *(f'--deselect=test/{group.tests[0]}/test_{each}.py' for each in group.without),
         ],
-        'timeout_constant': 20.0,
+        'timeout_constant': 10.0,
+        'timeout_multiplier': 5.0,
     }
     project = (ROOT / 'pyproject.toml').read_text(encoding='utf-8')
     section = '\n'.join(f'{key} = {json.dumps(value)}' for key, value in settings.items())
@@ -116,10 +119,10 @@ def run(name: str, children: int) -> None:
 
 
 def _copy_checkout(copy: Path) -> bool:
-    """Copy what git knows and has changed; return whether a test is among it."""
+    """Copy what git knows and has changed; return whether it is code or a test."""
     listed = ['git', 'ls-files', '-z', '--cached', '--others', '--exclude-standard']
     names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    tests_changed = False
+    code_changed = False
     for path in [*copy.rglob('*.py')]:
         here = path.relative_to(copy)
         name = here.relative_to('mutants') if here.parts[0] == 'mutants' else here
@@ -135,8 +138,8 @@ def _copy_checkout(copy: Path) -> bool:
             continue  # a file that keeps its time keeps its results
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, target)
-        tests_changed |= name.startswith('test/')
-    return tests_changed
+        code_changed |= name.endswith('.py')
+    return code_changed
 
 
 def _results(copy: Path) -> dict[str, Path]:

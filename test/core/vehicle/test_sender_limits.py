@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 
 from peace_ros.core.domain import Setpoint, Telemetry, VehicleError
@@ -306,9 +308,41 @@ def test_a_thread_is_started_once(bench: Bench) -> None:
     bench.sender.start()
     thread = bench.sender._thread
     assert thread is not None
+    assert thread.name == 'setpoint_sender'
     bench.sender.start()
     assert bench.sender._thread is thread
     assert thread.is_alive()
     assert bench.sender._ticked_ns == bench.now_ns
     bench.sender.stop()
     assert not thread.is_alive()
+
+
+def test_a_defect_while_the_autopilot_is_asked_to_hold_is_reported(eventually) -> None:
+    defects: list[BaseException] = []
+    link, now_ns = Link(), 10**12
+    names: list[str] = []
+
+    def fail() -> RequestResult:
+        names.append(threading.current_thread().name)
+        raise ZeroDivisionError
+
+    link.request_hold = fail
+    sender = SetpointSender(link, parameters=P, steady_ns=lambda: now_ns, on_defect=defects.append)
+    sender.submit(FORWARD)
+    now_ns += 3000 * MS
+    sender.tick()
+    assert eventually(lambda: [type(each) for each in defects] == [ZeroDivisionError])
+    assert names == ['hand_over']
+
+
+def test_the_thread_goes_on_after_it_was_woken(eventually) -> None:
+    link = Link()
+    sender = SetpointSender(link, parameters=P)
+    sender.start()
+    sender.submit(FORWARD)
+    assert eventually(lambda: len(link.sent) > 0)
+    sender.submit(ZERO)
+    count = len(link.sent)
+    assert eventually(lambda: len(link.sent) > count + 3)
+    assert not sender.is_stuck
+    sender.stop()
