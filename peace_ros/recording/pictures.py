@@ -145,7 +145,9 @@ def draw_trajectory(scene: TrajectoryScene) -> Image:
     edge = Rectangle((-east / 2, -north / 2), east, north, fill=False, edgecolor='white')
     ground.add_patch(_outlined(edge))
     places = [(point.east_m, point.north_m) for point in scene.track]
-    ground.add_collection(_outlined(_coloured(places, scene, 4.0)))
+    # One outline for the whole path: those of its steps would cover the colours beside them.
+    ground.plot(*zip(*places, strict=True), color='black', linewidth=6.5, solid_capstyle='round')
+    ground.add_collection(_coloured(places, scene, 4.0))
     marks = _draw_places(ground, scene)
     _draw_scale(ground, view)
     ground.axis(view.extent_m)
