@@ -11,6 +11,7 @@ predicts better, summed since it last predicted worse (CUSUM, Page 1954).
 
 from __future__ import annotations
 
+from collections import deque
 from math import exp, hypot
 
 import numpy as np
@@ -25,18 +26,23 @@ BIAS_M_S = 0.5
 BIAS_TIME_S = 15.0
 """and how long it stays alike."""
 NOISE_M2_S = 0.06
-"""Growth of the variance of reported ways: noise of the position, gusts."""
+"""Growth of the variance of reported ways by the noise of the position and gusts."""
 QUICK_S = 0.5
 """A vehicle leans before it moves. A quick one follows with this time constant,"""
 SLOW_S, SLOW_M_S2 = 0.7, 3.0
 """a slow one with this, and with no more than this acceleration (measured: ArduCopter 4.7)."""
 UNSETTLED_S = 1.0
 """While they differ, little is concluded: half of the difference is an error for so long."""
-EVIDENCE = 14.0
-"""Enough of it: right positions reached 10.4 in two hours of simulated flying with errors of twice
-the measured size, 8 m/s of wind and gusts."""
-EVIDENCE_PER_S = 40.0
-"""A gust may not convince at once."""
+EVIDENCE = 18.0
+"""Enough of it; a right position rarely reaches 10 with errors of twice the measured size."""
+EVIDENCE_PER_S = 30.0
+"""A gust may not convince at once,"""
+RECENT = 16
+"""nor without a way over so many periods"""
+RECENT_M = 1.2
+"""that is so long at least, by what was told,"""
+COMPARABLE = 0.5
+"""and of which the position shows this part where the fault says (a gust pushes less far)."""
 DRIFT_LIMIT_M_S = 2.0
 """A larger bias than this is none (six times the largest measured),"""
 DRIFT_M = 3.0
@@ -59,7 +65,7 @@ STILL_M = 0.01
 """A position that stays within this while the vehicle is told to go STILL_WAY_M is frozen: every
 real one has noise."""
 STILL_NOISY_M = 0.6
-STILL_BIAS_M_S = 1.5
+STILL_BIAS_M_S = 2.2
 """So much may be noise, where the way that remains after such a bias is as long."""
 STILL_WAY_M = 1.0
 LEAST_PART = 0.2
@@ -119,12 +125,13 @@ class AxesWatch:
         self._bias_variance = BIAS_M_S**2
         self._evidence = np.zeros(len(_GAINS))
         self._drift_m = 0.0
+        self._recent: deque[tuple[NDArray[np.float64], NDArray[np.float64]]] = deque(maxlen=RECENT)
         self._last_m: NDArray[np.float64] | None = None
         self._still = (_Still(STILL_M), _Still(STILL_NOISY_M))
         self._begin_period()
 
     def _begin_period(self) -> None:
-        self._seconds = self._gap_m2 = self._period_s = 0.0
+        self._seconds = self._gap_m2 = 0.0
         self._way_m = np.zeros(2)
 
     def take(self, seen_m: Plane, told_m_s: Plane, seconds: float) -> str:
@@ -141,11 +148,10 @@ class AxesWatch:
         seen = np.array(seen_m)
         gap = self._model.step(np.array(told_m_s), seconds)
         moved = self._model.velocity_m_s * seconds
-        self._period_s = seconds
         self._way_m += moved
         self._seconds += seconds
         self._gap_m2 += gap * seconds
-        problem = self._stands_still(seen, moved)
+        problem = self._stands_still(seen, seconds)
         if self._last_m is None:
             self._last_m = seen
             self._begin_period()
@@ -155,12 +161,12 @@ class AxesWatch:
             self._begin_period()
         return problem
 
-    def _stands_still(self, seen: NDArray[np.float64], moved: NDArray[np.float64]) -> str:
+    def _stands_still(self, seen: NDArray[np.float64], seconds: float) -> str:
         """Return why the position is frozen: exactly, or but for noise, against any bias."""
         exact, noisy = self._still
-        exact.see(seen, float(np.hypot(*moved)))
         slow_m_s = float(np.hypot(*self._model.slow_m_s))
-        noisy.see(seen, max(0.0, slow_m_s - STILL_BIAS_M_S) * self._period_s)
+        exact.see(seen, slow_m_s * seconds)
+        noisy.see(seen, max(0.0, slow_m_s - STILL_BIAS_M_S) * seconds)
         if max(exact.way_m, noisy.way_m) < STILL_WAY_M:
             return ''
         return (
@@ -170,6 +176,7 @@ class AxesWatch:
     def _compare(self, seen_m: NDArray[np.float64]) -> str:
         """Let each explanation predict the way of this period, and learn its bias."""
         seconds = self._seconds
+        self._recent.append((self._way_m, seen_m))
         keep = exp(-seconds / BIAS_TIME_S)
         before = self._bias_variance
         self._bias_variance = keep * keep * before + (1.0 - keep * keep) * BIAS_M_S**2
@@ -193,7 +200,7 @@ class AxesWatch:
         seen = told + self._bias[0]
         worst = int(self._evidence.argmax())
         shows = float(told @ seen) >= LEAST_PART * float(told @ told)
-        if self._evidence[worst] >= EVIDENCE and not (shows and worst == len(_NAMES) - 1):
+        if self._evidence[worst] >= EVIDENCE and self._shows_fault(worst):
             return f'the position does not follow what was told sideways: {_NAMES[worst]}'
         drift = hypot(*self._bias[0])
         if drift <= DRIFT_LIMIT_M_S or shows:
@@ -206,3 +213,18 @@ class AxesWatch:
             f'the position runs away sideways from what was told, at {drift:.1f} m/s (limit '
             f'{DRIFT_LIMIT_M_S:g} m/s)'
         )
+
+    def _shows_fault(self, fault: int) -> bool:
+        """Tell whether the last way was long, and comparably far where the fault says."""
+        told_m = sum((told for told, _ in self._recent), np.zeros(2))
+        seen_m = sum((seen for _, seen in self._recent), np.zeros(2))
+        square = float(told_m @ told_m)
+        if square < RECENT_M**2:
+            return False
+        if not _GAINS[fault].any():
+            # A bias may stop a vehicle that is slow.
+            return (
+                square >= (2.0 * RECENT_M) ** 2
+                and float(seen_m @ seen_m) <= (1.0 - COMPARABLE) ** 2 * square
+            )
+        return float(seen_m @ (_GAINS[fault] @ told_m)) >= COMPARABLE * square

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from itertools import pairwise
-from math import dist
+from math import dist, inf
 
 from peace_ros.core.vehicle.faulty_axes import AxesWatch
 
@@ -59,7 +59,7 @@ class ObedienceWatch:
         """Why the position is not believed, empty when it is."""
         self._marks: deque[_Mark] = deque()
         self._axes = AxesWatch()
-        self._told_m = 0.0
+        self._told_m, self._least_down_m_s = 0.0, inf
         self._velocity_m_s: Vector = (0.0, 0.0, 0.0)
 
     def forget(self) -> None:
@@ -67,11 +67,13 @@ class ObedienceWatch:
         self.problem = ''
         self._marks.clear()
         self._axes = AxesWatch()
-        self._told_m, self._velocity_m_s = 0.0, (0.0, 0.0, 0.0)
+        self._told_m, self._least_down_m_s = 0.0, inf
+        self._velocity_m_s = (0.0, 0.0, 0.0)
 
     def tell(self, velocity_m_s: Vector) -> None:
         """Note what the vehicle is told from now on."""
         self._velocity_m_s = velocity_m_s
+        self._least_down_m_s = min(self._least_down_m_s, velocity_m_s[2])
 
     def take(self, position_m: Vector | None, steady_ns: int, boot_ns: int | None = None) -> None:
         """Look at a position; the same report twice is looked at once.
@@ -101,7 +103,9 @@ class ObedienceWatch:
             boot_step_s = min(GAP_S, max(0.0, boot_s - last.boot_s))
             flown_s = min(at_s - last.at_s, boot_step_s)
         north, east, down = self._velocity_m_s
-        self._told_m += down * flown_s
+        # Any of those since the last report may have held.
+        self._told_m += min(down, self._least_down_m_s) * flown_s
+        self._least_down_m_s = inf
         self._marks.append(_Mark(at_s, boot_s, position_m, self._told_m))
         while at_s - self._marks[0].at_s > _MEMORY_S:
             self._marks.popleft()
