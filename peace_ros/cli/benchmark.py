@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +15,7 @@ from peace_ros.cli.extras import require
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.inference import Bundle
 from peace_ros.core.inference.providers import CPU, available_providers, check_providers
-from peace_ros.lab.benchmark.bundles import NAMES, SEGMENTS, random_bundles
+from peace_ros.lab.benchmark.bundles import NAMES, SEGMENTS, missing_bundles, random_bundles
 from peace_ros.lab.benchmark.measure import Measured
 from peace_ros.lab.benchmark.report import (
     clipseg_figures,
@@ -29,6 +30,7 @@ from peace_ros.lab.benchmark.worker import run_apart
 
 _CACHE = '~/.cache/peace_ros/benchmark'
 _RANDOM = 'random'
+_EXPORT = ('torch', 'transformers', 'onnx')
 _QUICK_CALLS = 8
 """Of one CLIP call per segment, those that are made with --quick; all take the same."""
 
@@ -82,8 +84,8 @@ def benchmark(
     """Time CLIPSeg and FastSAM frame by frame, compared with the ways that others run them."""
     provider = provider or _fastest()
     check_providers((provider,))
-    if reference or fastsam or not (clipseg and clip):  # the reference, or random bundles
-        require('torch', 'transformers', 'onnx')
+    if reference:
+        require(*_EXPORT)
     if reference and bool(clipseg) != (source != _RANDOM):
         raise ConfigurationError(
             f'--clipseg {clipseg or "(random)"} with --source {source}: the reference must have '
@@ -93,7 +95,7 @@ def benchmark(
         _sweep(clipseg, work, threads, table, json_file)
         return
     needed = [name for name in NAMES if fastsam or not name.startswith('fastsam')]
-    random = random_bundles(work, typer.echo, needed) if fastsam or not (clipseg and clip) else {}
+    random = _random(work, needed) if fastsam or not (clipseg and clip) else {}
     clipseg = clipseg or str(random['clipseg-rd64-int8'])
     fp32 = str(random['clipseg-rd64-fp32']) if 'int8' in clipseg and random else clipseg
     clip = clip or str(random['clip-vit-b-32-int8'])
@@ -131,12 +133,19 @@ def benchmark(
     _write(text, found, table, json_file)
 
 
+def _random(work: Path, names: Sequence[str]) -> dict[str, Path]:
+    """Return the random bundles; only what is not there yet takes the ``export`` extra."""
+    if missing_bundles(work, names):
+        require(*_EXPORT)
+    return random_bundles(work, typer.echo, names)
+
+
 def _sweep(clipseg: str, work: Path, threads: int, table: Path, json_file: Path | None) -> None:
     if clipseg:
         bundles = {Bundle.load(clipseg).manifest.precision: clipseg}
     else:
         names = {each: f'clipseg-rd64-{each}' for each in ('fp32', 'int8')}
-        made = random_bundles(work, typer.echo, tuple(names.values()))
+        made = _random(work, tuple(names.values()))
         bundles = {precision: str(made[name]) for precision, name in names.items()}
     conditions = describe_machine(threads, len(TERMS_13))
     rows = run_sweep(bundles, threads, typer.echo)

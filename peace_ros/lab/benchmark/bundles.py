@@ -34,7 +34,7 @@ def random_bundles(
     Raises BenchmarkError when the ``export`` extra is missing or a bundle cannot be made.
     """
     bundles = {name: folder.expanduser() / _RECIPE / name for name in names}
-    missing = [name for name, path in bundles.items() if not _is_whole(path)]
+    missing = missing_bundles(folder, names)
     # The precisions of one model are made in one process: it is drawn and loaded once. FastSAM's
     # comes after that of CLIP, which its bundle takes in.
     chains: dict[str, list[list[str]]] = {}
@@ -51,6 +51,11 @@ def random_bundles(
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         list(pool.map(make, chains.values()))
     return bundles
+
+
+def missing_bundles(folder: Path, names: Sequence[str] = NAMES) -> list[str]:
+    """Return which random bundles would have to be made, which takes the ``export`` extra."""
+    return [name for name in names if not _is_whole(folder.expanduser() / _RECIPE / name)]
 
 
 def _is_whole(path: Path) -> bool:
