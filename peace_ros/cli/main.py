@@ -34,6 +34,7 @@ VERBS = {
     'faults': 'Put every fault into a flight of the real processes, and judge what happens.',
     'evaluate': 'Measure on labelled images how safe it is what the heatmaps call safe.',
     'ablate': 'Measure what vocabularies, templates, words, fusion and thresholds are worth.',
+    'experiment': 'Fly many landings in simulated time and judge each by ground truth.',
     'words': 'Measure how often CLIP names the weather, light or look of a frame.',
 }
 """Verb -> its line in the help. The function of that name in the module of that name runs it."""

@@ -79,6 +79,17 @@ def draw_world(seed: int, size_m: float = 400.0, gsd_m: float = 0.1) -> World:
     Raises:
         WorldError: an argument is out of its range, or the image would be too large.
     """
+    name, size_px = check_drawn(seed, size_m, gsd_m)
+    image, labels = draw_town(seed, size_px, gsd_m)
+    return World(image, labels, gsd_m, name)
+
+
+def check_drawn(seed: int, size_m: float, gsd_m: float) -> tuple[str, int]:
+    """Return the name and the size in pixels of a drawn world; see :func:`draw_world`.
+
+    Raises:
+        WorldError: an argument is out of its range, or the image would be too large.
+    """
     if seed < 0:
         raise WorldError(f'seed {seed} of a drawn world: give a whole number of 0 or more')
     if not 60.0 <= size_m <= 2000.0:
@@ -88,8 +99,7 @@ def draw_world(seed: int, size_m: float = 400.0, gsd_m: float = 0.1) -> World:
     size_px = round(size_m / gsd_m)
     name = f'drawn-{seed}'
     check_size(size_px, size_px, f'world {name!r}')
-    image, labels = draw_town(seed, size_px, gsd_m)
-    return World(image, labels, gsd_m, name)
+    return name, size_px
 
 
 def load_world(

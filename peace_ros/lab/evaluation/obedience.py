@@ -19,15 +19,16 @@ from math import cos, hypot, pi, sin
 from random import Random
 
 from peace_ros.core.vehicle.obedience import ObedienceWatch
-from peace_ros.lab.evaluation.wind import flying
 from peace_ros.simulation.autopilot.estimate_errors import PX4_ERRORS, ErrorSizes, EstimateErrors
 from peace_ros.simulation.autopilot.guided import PositionTarget
+from peace_ros.simulation.autopilot.hovering import hovering
 from peace_ros.simulation.autopilot.personality import Kind, Personality
 from peace_ros.simulation.autopilot.physics import Physics
 
 TIME_LIMIT_S, WAY_LIMIT_M = 3.0, 4.0
 """A fault has to be found within both."""
 LEG_SPEEDS_M_S = (1.0, 1.5, 2.0, 3.0)
+_START_M = 60.0
 _TICK_S = 0.02
 _REPORT_S = 0.04
 _DELAY_S = 0.06
@@ -84,7 +85,7 @@ class WatchedFlight:
         turn = self.random.uniform(0.0, 2.0 * pi)
         wind = (wind_m_s * cos(turn), wind_m_s * sin(turn))
         physics = Physics(wind_to_m_s=wind, gust_m_s=_GUST_SHARE * wind_m_s, seed=seed)
-        self.flight = flying(physics, Personality(kind), EstimateErrors(sizes, seed))
+        self.flight = hovering(physics, _START_M, Personality(kind), EstimateErrors(sizes, seed))
         self.watch = ObedienceWatch()
         self._line = Random(seed)
         self.fault = ''

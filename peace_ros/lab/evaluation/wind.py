@@ -24,14 +24,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import Camera, Heatmap, Pose, Setpoint, Site, Telemetry, VehicleError
+from peace_ros.core.domain import Camera, Heatmap, Pose, Site, Telemetry
 from peace_ros.core.domain.geometry import ground_to_image
 from peace_ros.core.landing import Decision, LandingCore, LandingParameters, State
 from peace_ros.core.mapping import MapParameters
 from peace_ros.simulation.autopilot.estimate_errors import PX4_ERRORS, EstimateErrors
-from peace_ros.simulation.autopilot.flight import Flight
-from peace_ros.simulation.autopilot.guided import PositionTarget
-from peace_ros.simulation.autopilot.modes import Mode
+from peace_ros.simulation.autopilot.hovering import hovering, velocity_target
 from peace_ros.simulation.autopilot.personality import Kind, Personality
 from peace_ros.simulation.autopilot.physics import Physics
 
@@ -52,9 +50,6 @@ _AFTER_S = 10.0
 """Time observed after the hand-over, in which gusts go on."""
 _LAST_S = 10.0
 """End of the descent, in which the vehicle must hover over the site."""
-_BOOT_S = 60.0
-_VELOCITY_AND_RATE = 0x5C7
-_LOCAL_NED = 1
 _PIXELS = 96
 _CELL_M = 0.5
 _HALF_M = 100.0
@@ -118,7 +113,7 @@ class WindFlight:
         physics = Physics(wind_to_m_s=wind, gust_m_s=gust_m_s, seed=seed)
         kind = Kind.PX4 if px4_errors > 0.0 else Kind.ARDUPILOT
         errors = EstimateErrors(PX4_ERRORS.times(px4_errors), seed)
-        self._flight = flying(physics, Personality(kind), errors)
+        self._flight = hovering(physics, START_M, Personality(kind), errors)
         self._ground = self._painted()
         self._camera = Camera.from_degrees(_PIXELS, _PIXELS, 73)
         self._core = LandingCore(LandingParameters(), self._camera, MapParameters(map_size_m=160.0))
@@ -211,7 +206,7 @@ class WindFlight:
         decision = self._core.step(round(self._now_s * 1e9), self._telemetry, age_s)
         physics = self._flight.physics
         self.track.append((self._now_s, physics.north_m, physics.east_m, decision))
-        self._flight.take_velocity(_target(decision.setpoint))
+        self._flight.take_velocity(velocity_target(decision.setpoint))
 
     def _error_m(self, index: int, site: Site | None) -> float:
         _, north, east, _ = self.track[index]
@@ -245,46 +240,6 @@ def to_and_fro_m(places_m: NDArray[np.float64]) -> float:
     rise = (places_m - np.minimum.accumulate(places_m)).max(axis=0)
     fall = (np.maximum.accumulate(places_m) - places_m).max(axis=0)
     return float(np.minimum(rise, fall).max())
-
-
-def flying(
-    physics: Physics, personality: Personality | None = None, errors: EstimateErrors | None = None
-) -> Flight:
-    """Return an autopilot that has hovered in this wind for a while, in GUIDED or OFFBOARD.
-
-    Args:
-        physics: Of the vehicle, at rest on the ground.
-        personality: Which autopilot; None: ArduPilot.
-        errors: Of its estimates; None: none.
-
-    Raises:
-        VehicleError: it does not come into the air.
-    """
-    flight = Flight(physics, personality, errors=errors)
-    while not flight.has_position:
-        flight.step(_TICK_S)
-    flight.set_mode(Mode.STABILIZE if flight.personality.is_px4 else Mode.GUIDED)
-    flight.arm(force=True)
-    flight.take_off(5.0)
-    until_s = flight.time_s + _BOOT_S
-    while flight.landed_state.name != 'IN_AIR':
-        if flight.time_s > until_s:
-            raise VehicleError(f'the simulated vehicle did not take off within {_BOOT_S:g} s')
-        flight.step(_TICK_S)
-    physics.north_m = physics.east_m = 0.0
-    physics.down_m = -START_M
-    for mode in (Mode.BRAKE, Mode.GUIDED):
-        flight.take_velocity(_target(Setpoint(0)))
-        flight.set_mode(mode)
-        for _ in range(round(3.0 / _TICK_S)):
-            flight.take_velocity(_target(Setpoint(0)))
-            flight.step(_TICK_S)
-    return flight
-
-
-def _target(setpoint: Setpoint) -> PositionTarget:
-    velocity = (setpoint.v_north_m_s, setpoint.v_east_m_s, setpoint.v_down_m_s)
-    return PositionTarget(_LOCAL_NED, _VELOCITY_AND_RATE, velocity)
 
 
 def fly(

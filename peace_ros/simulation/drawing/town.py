@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from math import pi
 
 import numpy as np
@@ -25,31 +26,57 @@ _OPEN = ('park', 'farmland', 'village', 'desert')
 _BUILT = ('suburb', 'city', 'industrial', 'suburb', 'village')
 
 
+class Town:
+    """The plan of a mixed place, and its drawing in parts.
+
+    Args:
+        seed: 0 or more; the same seed and extent give the same place at any resolution.
+        extent_m: width and height in metres.
+    """
+
+    def __init__(self, seed: int, extent_m: float) -> None:
+        rng = np.random.Generator(np.random.PCG64([seed, 2]))
+        season = SEASONS[int(rng.choice(4, p=(0.3, 0.4, 0.2, 0.1)))]
+        self._seed, self._half_m = seed, 0.5 * extent_m
+        self._sun = Sun(float(rng.uniform(0.0, 2.0 * pi)), float(rng.uniform(0.75, 1.0)), 0.9)
+        self._look = Look.draw(rng)
+        self._plan = plan_town(rng, season, extent_m)
+
+    def draw(
+        self, rows: slice, columns: slice, gsd_m: float
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Return the image (height x width x 3, RGB) and the labels of a part.
+
+        Args:
+            rows: pixels, counted from the north edge.
+            columns: pixels, counted from the west edge.
+            gsd_m: metres per pixel.
+        """
+        margin = round(_MARGIN_M / gsd_m)
+        window = DrawnWindow(
+            (columns.start - margin) * gsd_m - self._half_m,
+            (rows.start - margin) * gsd_m - self._half_m,
+            columns.stop - columns.start + 2 * margin,
+            rows.stop - rows.start + 2 * margin,
+            gsd_m,
+        )
+        canvas = render(self._plan, window, self._seed, self._sun, self._look)
+        inner = (slice(margin, window.height_px - margin), slice(margin, window.width_px - margin))
+        return develop(canvas, self._look, self._seed)[inner], canvas.labels[inner]
+
+
+def tiles_of(size_px: int, tile_px: int) -> list[slice]:
+    """Return the pixels of each tile along one side."""
+    return [slice(at, min(at + tile_px, size_px)) for at in range(0, size_px, tile_px)]
+
+
 def draw_town(seed: int, size_px: int, gsd_m: float) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Return image (size x size x 3, RGB) and labels (size x size) of a mixed place."""
-    rng = np.random.Generator(np.random.PCG64([seed, 2]))
-    season = SEASONS[int(rng.choice(4, p=(0.3, 0.4, 0.2, 0.1)))]
-    sun = Sun(float(rng.uniform(0.0, 2.0 * pi)), float(rng.uniform(0.75, 1.0)), 0.9)
-    look = Look.draw(rng)
-    extent = size_px * gsd_m
-    plan = plan_town(rng, season, extent)
+    town = Town(seed, size_px * gsd_m)
     image = np.empty((size_px, size_px, 3), np.uint8)
     labels = np.empty((size_px, size_px), np.uint8)
-    margin = round(_MARGIN_M / gsd_m)
-    for top in range(0, size_px, _TILE_PX):
-        for left in range(0, size_px, _TILE_PX):
-            rows, columns = min(_TILE_PX, size_px - top), min(_TILE_PX, size_px - left)
-            window = DrawnWindow(
-                (left - margin) * gsd_m - 0.5 * extent,
-                (top - margin) * gsd_m - 0.5 * extent,
-                columns + 2 * margin,
-                rows + 2 * margin,
-                gsd_m,
-            )
-            canvas = render(plan, window, seed, sun, look)
-            inner = (slice(margin, margin + rows), slice(margin, margin + columns))
-            image[top : top + rows, left : left + columns] = develop(canvas, look, seed)[inner]
-            labels[top : top + rows, left : left + columns] = canvas.labels[inner]
+    for rows, columns in product(tiles_of(size_px, _TILE_PX), repeat=2):
+        image[rows, columns], labels[rows, columns] = town.draw(rows, columns, gsd_m)
     return image, labels
 
 

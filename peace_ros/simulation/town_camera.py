@@ -1,0 +1,92 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A nadir camera over a drawn town whose ground is drawn when it first comes into view.
+
+A flight sees a small part of its world, most of it from high up. Each part is drawn at the
+resolution that the view needs. What a part looks like depends on the seed and on its place only,
+so that all flights over one town see the same ground, in any order.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from math import log2
+
+import numpy as np
+from numpy.typing import NDArray
+
+from peace_ros.core.domain import Camera
+from peace_ros.simulation.camera import LabelSquare, NadirCamera, SeenWorld, label_square
+from peace_ros.simulation.drawing.town import Town, tiles_of
+from peace_ros.simulation.world import World, check_drawn
+
+_LEVELS = 3
+_TILE_PX = 500
+_FINEST_WITHIN_M = 15.0
+"""Ground truth of a circle up to this radius comes from the finest level."""
+
+
+class TownCamera(NadirCamera):
+    """Looks at a drawn town.
+
+    Args:
+        seed: of the town, 0 or more.
+        camera: what takes the pictures.
+        size_m: side of the town in metres, 60 to 2000.
+        gsd_m: finest ground sampling distance in metres per pixel, 0.05 to 2.
+        centre_m: north and east of the middle of the town in the local frame.
+
+    Raises:
+        WorldError: an argument is out of its range, or the image would be too large.
+    """
+
+    def __init__(
+        self,
+        seed: int,
+        camera: Camera,
+        size_m: float,
+        gsd_m: float,
+        centre_m: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
+        name, size_px = check_drawn(seed, size_m, gsd_m)
+        self._town = Town(seed, size_px * gsd_m)
+        # The pages of an array of zeros take no memory before they are written to.
+        image = np.zeros((size_px, size_px, 3), np.uint8)
+        labels = np.zeros((size_px, size_px), np.uint8)
+        self._drawn: set[tuple[int, int, int]] = set()
+        self._labels = [labels, *(labels[:: 2**k, :: 2**k].copy() for k in range(1, _LEVELS))]
+        super().__init__(World(image, labels, gsd_m, name, *centre_m), camera)
+
+    def _reduced(self) -> list[NDArray[np.uint8]]:
+        """Return the levels, nothing drawn yet."""
+        return [
+            self.world.image_rgb,
+            *(np.zeros((*labels.shape, 3), np.uint8) for labels in self._labels[1:]),
+        ]
+
+    def labels_around(self, north_m: float, east_m: float, radius_m: float) -> LabelSquare | None:
+        """See :class:`NadirCamera`; large circles come from a coarser drawing."""
+        level = self._clipped(round(log2(max(radius_m / _FINEST_WITHIN_M, 1.0))))
+        place = np.array(self.world.pixel(north_m, east_m))
+        reach = np.full(2, radius_m / self.world.gsd_m)
+        self._ground(level, np.stack([place - reach, place + reach]))
+        column, row = ((place + 0.5) / 2**level - 0.5).tolist()
+        gsd_m = self.world.gsd_m * 2**level
+        return label_square(self._labels[level], (column, row), radius_m, gsd_m)
+
+    def _ground(self, level: int, corners_px: NDArray[np.float64]) -> SeenWorld:
+        level = self._clipped(level)
+        labels, image = self._labels[level], self._levels[level]
+        tiles = tiles_of(labels.shape[0], _TILE_PX)
+        at = np.floor(corners_px / (2**level * _TILE_PX)).astype(int)
+        # Beyond the edge the ground is mirrored, from the outer tiles.
+        low, high = (np.clip(each, 0, len(tiles) - 1) for each in (at.min(axis=0), at.max(axis=0)))
+        for row, column in product(range(low[1], high[1] + 1), range(low[0], high[0] + 1)):
+            if (level, row, column) not in self._drawn:
+                where = (tiles[row], tiles[column])
+                image[where], labels[where] = self._town.draw(*where, self.world.gsd_m * 2**level)
+                self._drawn.add((level, row, column))
+        return SeenWorld(image, labels)
+
+    def _clipped(self, level: int) -> int:
+        return min(max(level, 0), _LEVELS - 1)
