@@ -41,6 +41,15 @@ def experiment(
     gsd: Annotated[
         float | None, Option(metavar='M', help='Metres of ground per pixel of --world.')
     ] = None,
+    district: Annotated[
+        str, Option(metavar='NAME', help='Of drawn worlds: mixed, suburb, coast ...')
+    ] = 'mixed',
+    season: Annotated[
+        str, Option(metavar='NAME', help='Of drawn worlds; without: the seed of each run.')
+    ] = '',
+    condition: Annotated[
+        str, Option(metavar='NAME', help='Weather, light or image quality of every view.')
+    ] = 'clear',
     seed: Annotated[int, Option(help='Of worlds, starts and errors.')] = 1,
     rate: Annotated[float, Option(metavar='HZ', help='Heatmaps per second.')] = _PAPER_HZ,
     latency: Annotated[
@@ -65,7 +74,7 @@ def experiment(
     require('pyarrow', 'scipy', *(('distributed',) if scheduler else ()))
     from peace_ros.lab.experiment.figures import figures
     from peace_ros.lab.experiment.flight import Perception
-    from peace_ros.lab.experiment.places import Place
+    from peace_ros.lab.experiment.places import DRAWN, Place
     from peace_ros.lab.experiment.run import run_experiment
     from peace_ros.lab.experiment.settings import CONFIGURATIONS, ExperimentSettings
     from peace_ros.lab.experiment.store import FlightStore, Row
@@ -76,7 +85,7 @@ def experiment(
         policies=_names(policy),
         eyes=eyes,
         error_rate=error_rate,
-        places=tuple(Place(each, gsd) for each in world) if world else (Place(),),
+        places=tuple(Place(each, gsd, district, season, condition) for each in world or (DRAWN,)),
         seed=seed,
         perception=Perception(rate, latency),
         limit_s=limit,

@@ -15,9 +15,9 @@ from math import log2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import Camera
+from peace_ros.core.domain import Camera, WorldError
 from peace_ros.simulation.camera import LabelSquare, NadirCamera, SeenWorld, label_square
-from peace_ros.simulation.drawing.town import Town, tiles_of
+from peace_ros.simulation.drawing.town import MIXED, Town, tiles_of
 from peace_ros.simulation.world import World, check_drawn
 
 _LEVELS = 3
@@ -32,9 +32,11 @@ class TownCamera(NadirCamera):
     Args:
         seed: of the town, 0 or more.
         camera: what takes the pictures.
-        size_m: side of the town in metres, 60 to 2000.
+        size_m: side of the town in metres, 60 to 2000; four pixels must fit into it evenly.
         gsd_m: finest ground sampling distance in metres per pixel, 0.05 to 2.
         centre_m: north and east of the middle of the town in the local frame.
+        district: what it is made of, one of DISTRICTS.
+        season: spring, summer, autumn or winter; empty lets the seed choose.
 
     Raises:
         WorldError: an argument is out of its range, or the image would be too large.
@@ -47,9 +49,15 @@ class TownCamera(NadirCamera):
         size_m: float,
         gsd_m: float,
         centre_m: tuple[float, float] = (0.0, 0.0),
+        district: str = MIXED,
+        season: str = '',
     ) -> None:
         name, size_px = check_drawn(seed, size_m, gsd_m)
-        self._town = Town(seed, size_px * gsd_m)
+        if size_px % 2 ** (_LEVELS - 1):
+            raise WorldError(
+                f'town of {size_px} px: give a size that is a multiple of {2 ** (_LEVELS - 1)} px'
+            )
+        self._town = Town(seed, size_px * gsd_m, district, season)
         # The pages of an array of zeros take no memory before they are written to.
         image = np.zeros((size_px, size_px, 3), np.uint8)
         labels = np.zeros((size_px, size_px), np.uint8)

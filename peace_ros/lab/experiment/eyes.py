@@ -14,6 +14,7 @@ from scipy.stats import norm
 from peace_ros.core.domain import Frame, Heatmap, ImageError, is_safe
 from peace_ros.core.pipeline import Pipeline
 from peace_ros.simulation.camera import CameraView
+from peace_ros.simulation.drawing import apply_condition
 
 _SAFE, _UNSAFE = 0.9, 0.1
 _ERROR_SIZE_PX = 4.0
@@ -30,16 +31,26 @@ class Eyes(Protocol):
 
 
 class ModelEyes:
-    """The cores of a configuration: prompts and segmentation, as in flight."""
+    """The cores of a configuration: prompts and segmentation, as in flight.
 
-    def __init__(self, pipeline: Pipeline) -> None:
+    Args:
+        pipeline: of the configuration; a new sequence of frames begins.
+        condition: weather, light or image quality, one of CONDITIONS.
+        seed: of the condition, which stays the same during a flight.
+    """
+
+    def __init__(self, pipeline: Pipeline, condition: str = 'clear', seed: int = 0) -> None:
         pipeline.reset()
         self._pipeline = pipeline
+        self._condition, self._seed = condition, seed
 
     def see(self, view: CameraView, stamp_ns: int) -> Heatmap | None:
         """See :class:`Eyes`."""
+        image = apply_condition(
+            view.image_rgb, self._condition, np.random.default_rng(self._seed), labels=view.labels
+        )
         try:
-            return self._pipeline.look(Frame(view.image_rgb, stamp_ns)).heatmap
+            return self._pipeline.look(Frame(image, stamp_ns)).heatmap
         except ImageError:
             return None
 

@@ -58,9 +58,10 @@ def fly_run(settings: ExperimentSettings, keys: Sequence[FlightKey]) -> list[Row
 def _fly(
     settings: ExperimentSettings, key: FlightKey, preset: Preset, camera: NadirCamera, start: Start
 ) -> Row:
+    condition = settings.place_of(key.run).condition
     eyes: Eyes = TruthEyes(settings.error_rate, start.seed)
     if settings.eyes == 'model':
-        eyes = ModelEyes(_pipeline(str(preset.path)))
+        eyes = ModelEyes(_pipeline(str(preset.path)), condition, start.seed)
     policy: Policy = OurPolicy(preset, camera.camera)
     if key.policy == 'dovesei':
         policy = DoveseiPolicy(camera.camera)

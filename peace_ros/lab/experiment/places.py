@@ -14,8 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from peace_ros.core.domain import Camera, ConfigurationError
+from peace_ros.core.domain import Camera, ConfigurationError, WorldError
 from peace_ros.simulation.camera import NadirCamera
+from peace_ros.simulation.drawing import CONDITIONS
+from peace_ros.simulation.drawing.town import MIXED, check_town
 from peace_ros.simulation.town_camera import TownCamera
 from peace_ros.simulation.world import World, load_world
 
@@ -35,10 +37,23 @@ class Place:
     """`drawn`, or the file of an orthophoto; its labels lie beside it as `<name>_label.png`."""
     gsd_m: float | None = None
     """Metres per pixel of the file; None: its georeference says it."""
+    district: str = MIXED
+    """Of a drawn world, one of DISTRICTS."""
+    season: str = ''
+    """Of a drawn world; empty: the seed of each run chooses."""
+    condition: str = 'clear'
+    """Weather, light or image quality of every view, one of CONDITIONS."""
 
     def __post_init__(self) -> None:
+        check_town(self.district, self.season)
+        if self.condition not in CONDITIONS:
+            raise WorldError(f'condition {self.condition!r}: choose one of {", ".join(CONDITIONS)}')
         if self.world == DRAWN:
             return
+        if self.season or self.district != MIXED:
+            raise ConfigurationError(
+                f'district and season belong to drawn worlds, not to {self.world}: leave them out'
+            )
         if not self.path.is_file():
             raise ConfigurationError(
                 f'world {self.world}: no such file; give an orthophoto, or {DRAWN}'
@@ -114,7 +129,7 @@ def open_camera(place: Place, start: Start, camera: Camera) -> NadirCamera:
     """
     centre_m = (-start.north_m, -start.east_m)
     if place.world == DRAWN:
-        return TownCamera(start.seed, camera, SIZE_M, GSD_M, centre_m)
+        return TownCamera(start.seed, camera, SIZE_M, GSD_M, centre_m, place.district, place.season)
     world = place.load()
     return NadirCamera(
         World(world.image_rgb, world.labels, world.gsd_m, world.name, *centre_m), camera
