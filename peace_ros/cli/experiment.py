@@ -11,11 +11,12 @@ from typing import Annotated
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
-from typer import Option
+from typer import Exit, Option
 
 from peace_ros.cli.extras import require
 
 _PAPER_HZ = 0.82
+_INTERRUPTED = 130
 
 
 def experiment(
@@ -78,6 +79,7 @@ def experiment(
     from peace_ros.lab.experiment.run import run_experiment
     from peace_ros.lab.experiment.settings import CONFIGURATIONS, ExperimentSettings
     from peace_ros.lab.experiment.store import FlightStore, Row
+    from peace_ros.simulation.demo.signals import interruptible
 
     settings = ExperimentSettings(
         runs=runs,
@@ -97,7 +99,8 @@ def experiment(
         MofNCompleteColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+    progress = Progress(*columns, console=console, disable=not console.is_terminal)
+    with interruptible(), progress:
         total = sum(1 for run in range(runs) for _ in settings.flights_of(run))
         wanted = {key for run in range(runs) for key in settings.flights_of(run)}
         task = progress.add_task('flights', total=total, completed=len(store.finished & wanted))
@@ -107,7 +110,16 @@ def experiment(
             for row in rows:
                 console.print(_line(row), markup=False, highlight=False, soft_wrap=True)
 
-        run_experiment(settings, store, workers=workers, scheduler=scheduler, watch=tell)
+        try:
+            run_experiment(settings, store, workers=workers, scheduler=scheduler, watch=tell)
+        except KeyboardInterrupt:
+            console.print(
+                f'interrupted: {len(store.finished)} flights are kept in {store.path}; the same '
+                'command goes on',
+                highlight=False,
+                soft_wrap=True,
+            )
+            raise Exit(_INTERRUPTED) from None
     told = figures(store.rows())
     if json_file is not None:
         json_file.write_text(json.dumps(told, indent=2) + '\n', encoding='utf-8')

@@ -35,6 +35,7 @@ VERBS = {
     'evaluate': 'Measure on labelled images how safe it is what the heatmaps call safe.',
     'ablate': 'Measure what vocabularies, templates, words, fusion and thresholds are worth.',
     'experiment': 'Fly many landings in simulated time and judge each by ground truth.',
+    'report': 'Make a page of an experiment: tables, charts, failures with pictures.',
     'words': 'Measure how often CLIP names the weather, light or look of a frame.',
 }
 """Verb -> its line in the help. The function of that name in the module of that name runs it."""

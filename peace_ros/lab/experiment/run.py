@@ -107,6 +107,11 @@ def _executor(workers: int, scheduler: str) -> Iterator[Executor]:
         pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context('spawn'))
         try:
             yield pool
+        except KeyboardInterrupt:
+            # Nobody waits for the flights under way: they are flown again.
+            for process in multiprocessing.active_children():
+                process.terminate()
+            raise
         finally:
             pool.shutdown(cancel_futures=True)
         return

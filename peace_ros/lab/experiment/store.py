@@ -116,17 +116,14 @@ class FlightStore:
 
     def _checked(self, identity: Row, presets: dict[str, str]) -> dict[str, str]:
         """Return the presets of the file and the new ones; refuse those of another kind."""
-        metadata = pq.read_schema(self.path).metadata or {}
-        if _IDENTITY not in metadata:
-            raise ConfigurationError(f'{self.path} is no file of an experiment: give another --out')
-        held: Row = json.loads(metadata[_IDENTITY])
+        held = read_identity(self.path)
         for name, value in identity.items():
             if held.get(name) != value:
                 raise ConfigurationError(
                     f'{self.path} was flown with {name} = {held.get(name)}, and now it is {value}: '
                     'give another --out, or the same options'
                 )
-        known: dict[str, str] = json.loads(metadata[_FINGERPRINTS])
+        known: dict[str, str] = json.loads(pq.read_schema(self.path).metadata[_FINGERPRINTS])
         for name, checksum in presets.items():
             if known.get(name, checksum) != checksum:
                 raise ConfigurationError(
@@ -156,3 +153,16 @@ def read_flights(path: Path) -> pa.Table:
             f'{path} has other columns than an experiment of this version: move it away'
         )
     return table
+
+
+def read_identity(path: Path) -> Row:
+    """Return what all flights of a file have in common: see ExperimentSettings.identity.
+
+    Raises:
+        RecordingError: it is no file of an experiment.
+    """
+    metadata = pq.read_schema(path).metadata or {}
+    if _IDENTITY not in metadata:
+        raise RecordingError(f'{path} is no file of an experiment: give another folder')
+    identity: Row = json.loads(metadata[_IDENTITY])
+    return identity

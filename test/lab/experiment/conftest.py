@@ -43,3 +43,9 @@ def town(tmp_path: Path) -> Path:
 @pytest.fixture
 def stones(tmp_path: Path) -> Path:
     return save_world(tmp_path, meadow_in_town(meadow_m=0.0), 'stones')
+
+
+@pytest.fixture(scope='session')
+def shared_town(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same for fixtures that many tests share."""
+    return save_world(tmp_path_factory.mktemp('world'), meadow_in_town())

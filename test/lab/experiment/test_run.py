@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import multiprocessing
 import os
+import subprocess
+import sys
 import threading
 import time
 from dataclasses import replace
@@ -21,7 +23,7 @@ from peace_ros.lab.experiment.fly import fly_run
 from peace_ros.lab.experiment.places import Place, draw_start
 from peace_ros.lab.experiment.run import run_experiment
 from peace_ros.lab.experiment.settings import ExperimentSettings
-from peace_ros.lab.experiment.store import FlightStore
+from peace_ros.lab.experiment.store import FlightStore, read_flights
 
 
 def settings_for(*worlds: Path, runs: int = 1, **given) -> ExperimentSettings:
@@ -182,3 +184,53 @@ def test_a_world_needs_labels(town):
     town.with_name('town_label.png').unlink()
     with pytest.raises(ConfigurationError, match=r'put town_label.png beside it'):
         Place(str(town), 0.5)
+
+
+def test_a_dask_cluster_flies_the_same(town, tmp_path):
+    distributed = pytest.importorskip('distributed')
+    settings = settings_for(town, runs=2, limit_s=10.0)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        store = FlightStore(tmp_path / 'out', settings)
+        run_experiment(settings, store, scheduler=cluster.scheduler_address)
+    assert sorted(row['run'] for row in store.rows()) == [0, 1]
+    (alone,) = fly(settings)
+    (far,) = (row for row in store.rows() if row['run'] == 0)
+    assert far['track_east_m'] == pytest.approx(alone['track_east_m'])
+
+
+def test_a_scheduler_that_does_not_answer_is_refused(town, tmp_path):
+    pytest.importorskip('distributed')
+    settings = settings_for(town)
+    with pytest.raises(
+        ConfigurationError, match=r'--scheduler tcp://127\.0\.0\.1:9 does not answer'
+    ):
+        run_experiment(
+            settings, FlightStore(tmp_path / 'out', settings), scheduler='tcp://127.0.0.1:9'
+        )
+
+
+def test_an_interrupted_experiment_ends_at_once_and_goes_on(town, tmp_path):
+    command = [
+        *(sys.executable, '-m', 'peace_ros.cli.main', 'experiment', '--eyes', 'truth'),
+        *('--world', str(town), '--gsd', '0.5', '--limit', '10', '--out', str(tmp_path / 'out')),
+    ]
+    process = subprocess.Popen(
+        [*command, '--runs', '200'], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    store, until = tmp_path / 'out/flights.parquet', time.monotonic() + 120.0
+    while not store.exists() and time.monotonic() < until:
+        time.sleep(0.1)
+    process.terminate()
+    told, _ = process.communicate(timeout=60.0)
+    assert process.returncode == 130
+    kept = len(read_flights(store))
+    assert f'interrupted: {kept} flights are kept' in told
+    assert 'Traceback' not in told
+    assert 0 < kept < 200
+    again = subprocess.run(
+        [*command, '--runs', str(kept + 1)], capture_output=True, text=True, check=True
+    )
+    assert again.stdout.count('peace_cs ours: timeout') == 1
+    assert len(read_flights(store)) == kept + 1
