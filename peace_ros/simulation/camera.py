@@ -132,8 +132,8 @@ class NadirCamera:
                 )
         column, row = self.world.pixel(north_m, east_m)
         height, width = labels.shape
-        at_row = int(_mirrored(np.array([round(row)]), height)[0])
-        at_column = int(_mirrored(np.array([round(column)]), width)[0])
+        at_row = int(mirrored(np.array([round(row)]), height)[0])
+        at_column = int(mirrored(np.array([round(column)]), width)[0])
         return float(self._clearance_px[at_row, at_column]) * self.world.gsd_m
 
     def _ground(self, level: int, _corners_px: NDArray[np.float64]) -> SeenWorld:
@@ -233,11 +233,11 @@ def label_square(
     if not (away <= reach).any():
         columns, rows, away = np.array([round(column)]), np.array([round(row)]), np.zeros((1, 1))
     height, width = labels.shape
-    found = labels[np.ix_(_mirrored(rows, height), _mirrored(columns, width))]
+    found = labels[np.ix_(mirrored(rows, height), mirrored(columns, width))]
     return LabelSquare(found, away * gsd_m)
 
 
-def _mirrored(index: NDArray[np.float64], size: int) -> NDArray[np.intp]:
+def mirrored(index: NDArray[np.float64], size: int) -> NDArray[np.intp]:
     """Fold pixel numbers into 0 .. size - 1 as BORDER_REFLECT does (edge pixel repeated)."""
     folded = np.mod(index.astype(np.int64), 2 * size)
     return np.asarray(np.where(folded < size, folded, 2 * size - 1 - folded), np.intp)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import Camera, WorldError
-from peace_ros.simulation.camera import LabelSquare, NadirCamera, SeenWorld, label_square
+from peace_ros.simulation.camera import LabelSquare, NadirCamera, SeenWorld, label_square, mirrored
 from peace_ros.simulation.drawing.town import MIXED, Town, tiles_of
 from peace_ros.simulation.world import World, check_drawn
 
@@ -86,10 +86,14 @@ class TownCamera(NadirCamera):
         level = self._clipped(level)
         labels, image = self._labels[level], self._levels[level]
         tiles = tiles_of(labels.shape[0], _TILE_PX)
-        at = np.floor(corners_px / (2**level * _TILE_PX)).astype(int)
-        # Beyond the edge the ground is mirrored, from the outer tiles.
-        low, high = (np.clip(each, 0, len(tiles) - 1) for each in (at.min(axis=0), at.max(axis=0)))
-        for row, column in product(range(low[1], high[1] + 1), range(low[0], high[0] + 1)):
+        at = corners_px / 2**level
+        spans = zip(np.floor(at.min(axis=0)), np.ceil(at.max(axis=0)), strict=True)
+        # Beyond its edge the world is continued by mirroring: the tiles there are inner ones.
+        columns, rows = (
+            np.unique(mirrored(np.arange(low - 1, high + 2), labels.shape[0]) // _TILE_PX)
+            for low, high in spans
+        )
+        for row, column in product(rows.tolist(), columns.tolist()):
             if (level, row, column) not in self._drawn:
                 where = (tiles[row], tiles[column])
                 image[where], labels[where] = self._town.draw(*where, self.world.gsd_m * 2**level)

@@ -68,6 +68,15 @@ def test_no_pixel_in_view_is_left_undrawn(town):
         assert not (view.labels == Label.UNLABELED).any()
 
 
+def test_beyond_the_edge_the_ground_is_the_mirror_image_of_drawn_ground(whole):
+    town = TownCamera(5, CAMERA, 120.0, 0.2)
+    for place in ((150.0, 0.0), (20.0, -175.0), (-130.0, 140.0)):
+        assert np.array_equal(whole.labels_at(*place, 1.5), town.labels_at(*place, 1.5))
+        view = town.view(pose(*place, 20.0))
+        assert view.mirrored
+        assert not (view.labels == Label.UNLABELED).any()
+
+
 def test_a_size_that_does_not_halve_evenly_is_refused():
     with pytest.raises(WorldError, match='multiple of 4 px'):
         TownCamera(1, CAMERA, 60.2, 0.2)
