@@ -1,0 +1,194 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What keeps the vehicle from following our set-points, as far as the autopilot reports it; pure.
+
+Sources: FENCE_STATUS, POSITION_TARGET_LOCAL_NED, BATTERY_STATUS, STATUSTEXT.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from math import isfinite
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+Vector = tuple[float, float, float]
+"""North, east, down."""
+MESSAGES = frozenset({'FENCE_STATUS', 'POSITION_TARGET_LOCAL_NED', 'BATTERY_STATUS'})
+FENCE_LIMIT_NS = 1_000_000_000
+"""An older FENCE_STATUS says nothing of now."""
+BATTERY_LIMIT_NS = 5_000_000_000
+TEXT_LIMIT_NS = 3_000_000_000
+"""A STATUSTEXT may explain what happens so long after it."""
+BREACHES = {
+    mavlink.FENCE_BREACH_MINALT: 'least altitude',
+    mavlink.FENCE_BREACH_MAXALT: 'greatest altitude',
+    mavlink.FENCE_BREACH_BOUNDARY: 'boundary',
+}
+LOW = {
+    mavlink.MAV_BATTERY_CHARGE_STATE_LOW: 'low',
+    mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL: 'critically low',
+    mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY: 'so low that it must land at once',
+    mavlink.MAV_BATTERY_CHARGE_STATE_FAILED: 'failed',
+    mavlink.MAV_BATTERY_CHARGE_STATE_UNHEALTHY: 'unhealthy',
+}
+"""MAV_BATTERY_CHARGE_STATE of a battery that may end the flight, in words."""
+SETTLED_NS = 1_000_000_000
+"""Targets are judged once our set-points have flowed for so long,"""
+PAUSE_NS = 500_000_000
+"""without such a pause."""
+OURS_NS = 1_500_000_000
+"""A set-point that we sent so long ago may still be the target that is reported."""
+TOLERANCE_M_S = 0.15
+RECENT, FOREIGN = 10, 3
+"""So many of the recent targets must not be ours: one may be late."""
+CALM_NS = 3_000_000_000
+"""A second commander counts as gone when no target of theirs was seen for so long."""
+VELOCITY_IGNORED = 0x038
+"""Bits of type_mask: the target is a position, not a velocity."""
+
+
+class TargetWatch:
+    """Compares the target that the autopilot follows with the set-points that we sent.
+
+    A target is ours when each component lies between zero and that of one of our recent
+    set-points: the autopilot may limit speeds, and stops when none come.
+    """
+
+    def __init__(self) -> None:
+        self._told: deque[tuple[int, Vector]] = deque()
+        """Steady clock and set-point: those of the last ``OURS_NS``."""
+        self._since_ns = 0
+        """Our set-points have flowed since then."""
+        self._foreign: deque[bool] = deque(maxlen=RECENT)
+        self._slower: deque[bool] = deque(maxlen=RECENT)
+        """Of the recent targets: not the set-point itself."""
+        self._seen_ns = 0
+        self._found = ''
+
+    def tell(self, velocity_m_s: Vector, steady_ns: int) -> None:
+        """Note a set-point that is sent now."""
+        if not self._told or steady_ns - self._told[-1][0] > PAUSE_NS:
+            self._since_ns = steady_ns
+            self._foreign.clear()
+            self._slower.clear()
+        self._told.append((steady_ns, velocity_m_s))
+        while steady_ns - self._told[0][0] > OURS_NS:
+            self._told.popleft()
+
+    def take(self, message: Any, steady_ns: int, *, limited: bool) -> None:
+        """Take POSITION_TARGET_LOCAL_NED; nothing is judged while a fence changes the target."""
+        told = self._told
+        flows = told and steady_ns - told[-1][0] <= PAUSE_NS
+        if limited or not flows or steady_ns - self._since_ns < SETTLED_NS:
+            return
+        velocity = (message.vx, message.vy, message.vz)
+        is_place = message.type_mask & VELOCITY_IGNORED != 0
+        if not is_place and not all(map(isfinite, velocity)):
+            return
+        foreign = is_place or not any(_explains(each, velocity) for _, each in told)
+        self._foreign.append(foreign)
+        same = any(max(map(abs, _minus(each, velocity))) <= TOLERANCE_M_S for _, each in told)
+        self._slower.append(not same)
+        if not foreign or sum(self._foreign) < FOREIGN:
+            return
+        self._seen_ns = steady_ns
+        what = 'a place' if is_place else '{:.1f}, {:.1f}, {:.1f} m/s'.format(*velocity)
+        self._found = (
+            f'a second commander: the autopilot follows a target that was not sent from here '
+            f'({what} in POSITION_TARGET_LOCAL_NED); end the other one, or sign the connection'
+        )
+
+    @property
+    def is_slower(self) -> bool:
+        """The autopilot follows slower targets than were sent: by a limit, or of somebody else."""
+        return sum(self._slower) >= FOREIGN
+
+    def problem(self, steady_ns: int) -> str:
+        """Return who else commands the vehicle, empty when nobody was seen lately."""
+        return self._found if self._found and steady_ns - self._seen_ns <= CALM_NS else ''
+
+
+class Stops:
+    """Keeps the newest report of each thing that may stop the vehicle."""
+
+    def __init__(self) -> None:
+        self._targets = TargetWatch()
+        self._fence = (0, '', False)
+        """Steady clock, what it says, whether it limits the speed."""
+        self._battery = (0, '')
+        self._text = (0, '')
+
+    def tell(self, velocity_m_s: Vector, steady_ns: int) -> None:
+        """Note a set-point that is sent now."""
+        self._targets.tell(velocity_m_s, steady_ns)
+
+    def take(self, message: Any, steady_ns: int) -> None:
+        """Take one of ``MESSAGES``."""
+        kind = message.get_type()
+        if kind == 'FENCE_STATUS':
+            self._fence = (steady_ns, *_fence(message))
+        elif kind == 'BATTERY_STATUS':
+            self._battery = (steady_ns, LOW.get(message.charge_state, ''))
+        elif kind == 'POSITION_TARGET_LOCAL_NED':
+            self._targets.take(message, steady_ns, limited=self.limits_speed(steady_ns))
+
+    def take_text(self, text: str, steady_ns: int) -> None:
+        """Take a whole STATUSTEXT that warns."""
+        self._text = (steady_ns, text)
+
+    def fence(self, steady_ns: int) -> str:
+        """Return what a fence does to the vehicle now, empty when nothing."""
+        at_ns, words, _ = self._fence
+        return words if steady_ns - at_ns <= FENCE_LIMIT_NS else ''
+
+    def limits_speed(self, steady_ns: int) -> bool:
+        """Return whether a fence makes the vehicle slower than it is told."""
+        return bool(self.fence(steady_ns)) and self._fence[2]
+
+    def other_commander(self, steady_ns: int) -> str:
+        """Return who else commands the vehicle, empty when nobody was seen lately."""
+        return self._targets.problem(steady_ns)
+
+    def battery(self, steady_ns: int) -> str:
+        """Return that the battery is low or broken, empty when it is not reported to be."""
+        at_ns, words = self._battery
+        fresh = words and steady_ns - at_ns <= BATTERY_LIMIT_NS
+        return f'the battery is {words} (BATTERY_STATUS)' if fresh else ''
+
+    def explanation(self, steady_ns: int) -> str:
+        """Return what the autopilot reports that may explain its behaviour, empty without it."""
+        at_ns, text = self._text
+        said = f'"{text}"' if text and steady_ns - at_ns <= TEXT_LIMIT_NS else ''
+        return '; '.join(filter(None, (self.fence(steady_ns), self.battery(steady_ns), said)))
+
+    def hindrance(self, steady_ns: int) -> str:
+        """Return the same, and whether the targets that it follows are slower than ours."""
+        slower = 'it follows slower targets than were sent' if self._targets.is_slower else ''
+        return '; '.join(filter(None, (self.explanation(steady_ns), slower)))
+
+
+def _minus(one: Vector, other: Vector) -> Vector:
+    return one[0] - other[0], one[1] - other[1], one[2] - other[2]
+
+
+def _explains(told: Vector, target: Vector) -> bool:
+    return all(
+        min(0.0, ours) - TOLERANCE_M_S <= reported <= max(0.0, ours) + TOLERANCE_M_S
+        for ours, reported in zip(told, target, strict=True)
+    )
+
+
+def _fence(message: Any) -> tuple[str, bool]:
+    """Return what FENCE_STATUS says, and whether the fence limits the speed.
+
+    ArduPilot reports a velocity limit while it keeps the vehicle inside, without the type of the
+    fence, and the type once it is crossed.
+    """
+    if message.breach_mitigation == mavlink.FENCE_MITIGATE_VEL_LIMIT:
+        return 'a fence limits the speed of the vehicle (FENCE_STATUS)', True
+    if message.breach_status:
+        which = BREACHES.get(message.breach_type, 'type unknown')
+        return f'the vehicle is outside of its fence ({which}, FENCE_STATUS)', False
+    return '', False
