@@ -91,6 +91,8 @@ class Expected:
     """They end within this time, with a status that is not 0."""
     refuses: bool = False
     """The engagement is refused with a sentence."""
+    says: tuple[str, ...] = ()
+    """Each of these words is part of a reason in the status since the injection."""
     over_person_s: float | None = None
     """The vehicle descends within its safety radius of a person for no longer than this."""
     flies: bool = True
@@ -118,6 +120,8 @@ class FlightSetting:
     """All nodes take their time from ``/clock``."""
     signed: bool = False
     """Companion and autopilot share a key of MAVLink 2 signing."""
+    autopilot: str = 'ardupilot'
+    """What the simulated autopilot plays."""
     after_handover: str = 'hold'
     """Parameter of the landing node."""
     at_origin: bool = False
