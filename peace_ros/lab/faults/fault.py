@@ -57,11 +57,12 @@ class Moment:
     state: str = State.LANDING.value
     below_m: float = inf
     """True altitude, at which or below which."""
+    after_s: float = 0.0
+    """So long after both were seen."""
 
     def __str__(self) -> str:
-        if self.below_m == inf:
-            return f'in {self.state}'
-        return f'in {self.state} below {self.below_m:g} m'
+        below = '' if self.below_m == inf else f' below {self.below_m:g} m'
+        return f'in {self.state}{below}' + (f' for {self.after_s:g} s' if self.after_s else '')
 
 
 @dataclass(frozen=True)
