@@ -35,6 +35,7 @@ class AfterHandover:
         self._ended = threading.Event()
         self._due_s = 0.0
         self._asking = False
+        self._refused = ''
         self._landing_mode = ''
         """Mode of the autopilot's landing, once it has begun."""
         self.stage = ''
@@ -50,7 +51,7 @@ class AfterHandover:
         """
         if not handed_over:
             self._begun = False
-            self._landing_mode = self.stage = ''
+            self._landing_mode = self._refused = self.stage = ''
             self._site = None
             self._ended.set()
             return
@@ -92,7 +93,9 @@ class AfterHandover:
             return f'mode {told.mode or "unknown"}: a pilot or a failsafe is in control'
         if mode:
             return f'LANDING by the autopilot in mode {mode}'
-        return 'the autopilot is asked to land' if self._asking else 'hovering over a safe site'
+        if self._asking:
+            return 'the autopilot is asked to land'
+        return 'hovering over a safe site' + (f'; {self._refused}' if self._refused else '')
 
     def _land(self, link: VehicleLink, ended: threading.Event) -> None:
         self._request_land(link, ended)
@@ -111,6 +114,7 @@ class AfterHandover:
                     self._landing_mode = link.telemetry().mode
                     self._say('handed over: the autopilot lands by itself')
                     return
-                self._say(f'landing after the hand-over {result.answer.value}: {result.reason}')
+                self._refused = f'landing {result.answer.value}: {result.reason}'
+                self._say(f'handed over; {self._refused}')
             if ended.wait(_PAUSE_S):
                 return

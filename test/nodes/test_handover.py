@@ -147,6 +147,17 @@ def test_a_pilot_who_takes_over_before_the_landing_is_seen() -> None:
     after.end()
 
 
+def test_a_landing_that_is_refused_for_good_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('peace_ros.nodes.handover._PAUSE_S', 0.01)
+    link, after = Link(), AfterHandover('land', lambda _: None)
+    link.answers = []
+    until = time.monotonic() + 2.0
+    while 'refused' not in after.stage and time.monotonic() < until:
+        after.follow(link, SITE, handed_over=True)
+        time.sleep(0.01)
+    assert after.stage == 'hovering over a safe site; landing refused: no'
+
+
 def test_a_landing_that_is_asked_for_is_not_a_pilot() -> None:
     link, said = Link(), []
     link.answers = []
