@@ -8,7 +8,7 @@ Sources: FENCE_STATUS, POSITION_TARGET_LOCAL_NED, BATTERY_STATUS, STATUSTEXT.
 from __future__ import annotations
 
 from collections import deque
-from math import isfinite
+from math import dist, isfinite
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -38,32 +38,39 @@ SETTLED_NS = 1_000_000_000
 """Targets are judged once our set-points have flowed for so long,"""
 PAUSE_NS = 500_000_000
 """without such a pause."""
-OURS_NS = 1_500_000_000
-"""A set-point that we sent so long ago may still be the target that is reported."""
+NEW_NS = 1_500_000_000
+"""The target that is reported should be one of our set-points of this time."""
+OURS_NS = 5_000_000_000
+"""One that we sent so long ago is not somebody else's: an autopilot that does not receive us keeps
+the last one (ArduPilot for GUID_TIMEOUT, 3 s)."""
 TOLERANCE_M_S = 0.15
-RECENT, FOREIGN = 10, 3
-"""So many of the recent targets must not be ours: one may be late."""
+RECENT, FOREIGN = 10, 4
+"""So many of the recent targets must not be ours: some may be late, or older than the report of a
+fence that changes them."""
 CALM_NS = 3_000_000_000
 """A second commander counts as gone when no target of theirs was seen for so long."""
-VELOCITY_IGNORED = 0x038
-"""Bits of type_mask: the target is a position, not a velocity."""
+PLACE_IGNORED, VELOCITY_IGNORED = 0x007, 0x038
+"""Bits of type_mask."""
 
 
 class TargetWatch:
     """Compares the target that the autopilot follows with the set-points that we sent.
 
     A target is ours when each component lies between zero and that of one of our recent
-    set-points: the autopilot may limit speeds, and stops when none come.
+    set-points: the autopilot may limit speeds, and stops when none come. Nobody is accused before
+    one of our set-points was seen as the target: an autopilot may report something else.
     """
 
     def __init__(self) -> None:
+        self._comparable = False
+        """A target was one of our set-points."""
         self._told: deque[tuple[int, Vector]] = deque()
         """Steady clock and set-point: those of the last ``OURS_NS``."""
         self._since_ns = 0
         """Our set-points have flowed since then."""
         self._foreign: deque[bool] = deque(maxlen=RECENT)
-        self._slower: deque[bool] = deque(maxlen=RECENT)
-        """Of the recent targets: not the set-point itself."""
+        self._other: deque[bool] = deque(maxlen=RECENT)
+        """Of the recent targets: none of our new set-points."""
         self._seen_ns = 0
         self._found = ''
 
@@ -72,7 +79,7 @@ class TargetWatch:
         if not self._told or steady_ns - self._told[-1][0] > PAUSE_NS:
             self._since_ns = steady_ns
             self._foreign.clear()
-            self._slower.clear()
+            self._other.clear()
         self._told.append((steady_ns, velocity_m_s))
         while steady_ns - self._told[0][0] > OURS_NS:
             self._told.popleft()
@@ -81,17 +88,22 @@ class TargetWatch:
         """Take POSITION_TARGET_LOCAL_NED; nothing is judged while a fence changes the target."""
         told = self._told
         flows = told and steady_ns - told[-1][0] <= PAUSE_NS
+        if limited:
+            self._foreign.clear()
         if limited or not flows or steady_ns - self._since_ns < SETTLED_NS:
             return
         velocity = (message.vx, message.vy, message.vz)
-        is_place = message.type_mask & VELOCITY_IGNORED != 0
-        if not is_place and not all(map(isfinite, velocity)):
+        unused = message.type_mask & VELOCITY_IGNORED
+        is_place = unused == VELOCITY_IGNORED and not message.type_mask & PLACE_IGNORED
+        if not is_place and (unused or not all(map(isfinite, velocity))):
             return
         foreign = is_place or not any(_explains(each, velocity) for _, each in told)
         self._foreign.append(foreign)
-        same = any(max(map(abs, _minus(each, velocity))) <= TOLERANCE_M_S for _, each in told)
-        self._slower.append(not same)
-        if not foreign or sum(self._foreign) < FOREIGN:
+        new = (each for at_ns, each in told if steady_ns - at_ns <= NEW_NS)
+        same = any(dist(each, velocity) <= TOLERANCE_M_S for each in new)
+        self._other.append(not same)
+        self._comparable = self._comparable or same
+        if not foreign or not self._comparable or sum(self._foreign) < FOREIGN:
             return
         self._seen_ns = steady_ns
         what = 'a place' if is_place else '{:.1f}, {:.1f}, {:.1f} m/s'.format(*velocity)
@@ -101,9 +113,9 @@ class TargetWatch:
         )
 
     @property
-    def is_slower(self) -> bool:
-        """The autopilot follows slower targets than were sent: by a limit, or of somebody else."""
-        return sum(self._slower) >= FOREIGN
+    def is_other(self) -> bool:
+        """The autopilot does not follow our new set-points as they are."""
+        return sum(self._other) >= FOREIGN
 
     def problem(self, steady_ns: int) -> str:
         """Return who else commands the vehicle, empty when nobody was seen lately."""
@@ -164,13 +176,13 @@ class Stops:
         return '; '.join(filter(None, (self.fence(steady_ns), self.battery(steady_ns), said)))
 
     def hindrance(self, steady_ns: int) -> str:
-        """Return the same, and whether the targets that it follows are slower than ours."""
-        slower = 'it follows slower targets than were sent' if self._targets.is_slower else ''
-        return '; '.join(filter(None, (self.explanation(steady_ns), slower)))
-
-
-def _minus(one: Vector, other: Vector) -> Vector:
-    return one[0] - other[0], one[1] - other[1], one[2] - other[2]
+        """Return the same, and whether it follows other targets than our new set-points."""
+        other = (
+            'the targets that it follows are not our newest set-points: it may not receive them, '
+            'or limit them, or somebody else commands too'
+        )
+        known = (self.explanation(steady_ns), other if self._targets.is_other else '')
+        return '; '.join(filter(None, known))
 
 
 def _explains(told: Vector, target: Vector) -> bool:

@@ -29,8 +29,9 @@ MAYBE = frozenset(
     }
 )
 """Seldom asked for again: not every vehicle has them, or it sends them in some modes only."""
-FENCE_HZ = 4.0
 TARGET_HZ = 10.0
+FENCE_HZ = TARGET_HZ
+"""As often as targets: a fence changes them."""
 
 Request = tuple[int, tuple[float, float]]
 """MAV_CMD and its first two parameters."""

@@ -57,6 +57,18 @@ def test_a_vehicle_that_stands_before_a_fence_accuses_no_position_once_it_turns_
     assert told[-1].v_north_m_s < -2.0
 
 
+def test_a_vehicle_that_slides_along_a_fence_accuses_nobody(flown):
+    sim, _, fly = flown
+    north, east = sim.truth().north_m, sim.truth().east_m
+    told = fly(Setpoint(0, v_north_m_s=2.0), 2.0)
+    inject(sim, 'fence', kind='circle', at_m=14.0, north_m=north, east_m=east - 6.0)
+    told += fly(Setpoint(0, v_north_m_s=3.0), 8.0)
+    assert any(each.fence for each in told)
+    assert abs(sim.truth().east_m - east) > 1.0, 'it was turned aside'
+    accused = [each for each in told if each.other_commander or each.position_problem]
+    assert [each.other_commander + each.position_problem for each in accused] == []
+
+
 def test_a_doubt_of_before_stays_when_a_fence_comes(flown):
     sim, _, fly = flown
     inject(sim, 'altitude', kind='freeze')

@@ -65,7 +65,7 @@ def test_a_target_that_our_set_points_explain_accuses_nobody(reported):
     ids=['faster', 'another way', 'a place'],
 )
 def test_a_target_that_we_did_not_send_is_a_second_commander(reported, mask):
-    stops, now_ns = flown(lambda _t: [target(reported, mask)])
+    stops, now_ns = flown(lambda t: [target(OURS) if t < 1.5 else target(reported, mask)])
     assert 'a second commander' in stops.other_commander(now_ns)
     assert 'POSITION_TARGET_LOCAL_NED' in stops.other_commander(now_ns)
 
@@ -91,23 +91,42 @@ def test_our_own_older_set_point_accuses_nobody():
 
 
 def test_targets_count_once_our_set_points_flow():
-    stops, now_ns = flown(lambda _t: [target(THEIRS)], told=None)
-    assert stops.other_commander(now_ns) == ''
-    stops, now_ns = flown(lambda _t: [target(THEIRS)], seconds=0.9)
-    assert stops.other_commander(now_ns) == ''
+    def reports(t):
+        return [target(OURS if t < 0.3 else THEIRS)]
+
+    assert flown(reports, told=None)[0].other_commander(S) == ''
+    assert flown(reports, seconds=1.0)[0].other_commander(S) == ''
 
 
 def test_a_second_commander_that_falls_silent_is_gone_after_three_seconds():
-    stops, now_ns = flown(lambda t: [target(THEIRS if t < 2.0 else OURS)], seconds=4.5)
+    def reports(t):
+        return [target(THEIRS if 1.5 <= t < 2.5 else OURS)]
+
+    stops, now_ns = flown(reports, seconds=5.0)
     assert stops.other_commander(now_ns)
-    stops, now_ns = flown(lambda t: [target(THEIRS if t < 2.0 else OURS)], seconds=5.5)
+    stops, now_ns = flown(reports, seconds=6.0)
     assert stops.other_commander(now_ns) == ''
 
 
 def test_a_target_that_a_fence_has_changed_accuses_nobody():
-    stops, now_ns = flown(lambda _t: [fence(*LIMITED), target((-0.5, 0.0, 0.0))])
+    aside = target((-0.5, 0.0, 0.0))
+    stops, now_ns = flown(
+        lambda t: [target(OURS)] if t < 1.5 else [aside] if t < 1.8 else [fence(*LIMITED), aside]
+    )
     assert stops.other_commander(now_ns) == ''
     assert stops.limits_speed(now_ns)
+    stops, now_ns = flown(lambda t: [target(OURS) if t < 1.5 else aside])
+    assert stops.other_commander(now_ns)
+
+
+def test_an_autopilot_that_never_reports_our_set_point_is_not_compared():
+    stops, now_ns = flown(lambda _t: [target(THEIRS)])
+    assert stops.other_commander(now_ns) == ''
+
+
+def test_a_velocity_that_is_left_out_in_part_accuses_nobody():
+    stops, now_ns = flown(lambda t: [target(OURS) if t < 1.5 else target(THEIRS, 0xDCF)])
+    assert stops.other_commander(now_ns) == ''
 
 
 @pytest.mark.parametrize(
@@ -167,9 +186,21 @@ def test_a_text_explains_what_happens_soon_after_it():
 
 
 @pytest.mark.parametrize(
-    ('reported', 'words'), [(OURS, ''), ((0.2, 0.1, 0.3), 'slower targets than were sent')]
+    ('reported', 'words'), [(OURS, ''), ((0.2, 0.1, 0.3), 'are not our newest set-points')]
 )
 def test_slower_targets_explain_a_vehicle_that_does_not_follow(reported, words):
     stops, now_ns = flown(lambda _t: [target(reported)])
-    assert stops.hindrance(now_ns) == ('it follows ' + words if words else '')
+    assert words in stops.hindrance(now_ns)
+    assert bool(stops.hindrance(now_ns)) == bool(words)
     assert stops.explanation(now_ns) == ''
+
+
+def test_a_set_point_that_is_kept_because_no_newer_one_arrives_is_ours():
+    """The line to the autopilot is lost: it keeps the last set-point for GUID_TIMEOUT."""
+
+    def told(t):
+        return (3.0 - 0.4 * t, 0.0, 0.0)
+
+    stops, now_ns = flown(lambda t: [target(told(min(t, 1.5)))], told)
+    assert stops.other_commander(now_ns) == ''
+    assert 'it may not receive them' in stops.hindrance(now_ns)
