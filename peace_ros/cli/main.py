@@ -28,6 +28,7 @@ from peace_ros.core.domain import (
 EXIT_FAILED, EXIT_REFUSED, EXIT_INTERRUPTED = 1, 2, 130
 
 VERBS = {
+    'doctor': 'Check ROS, models, camera, autopilot and computer before a flight.',
     'demo': 'Fly a simulated vehicle from 100 m to 20 m over a place that the nodes choose.',
     'replay': 'Run prompts, segmentation and landing over a recording.',
     'benchmark': 'Time CLIPSeg and FastSAM per frame, beside the ways that others run them.',
@@ -40,6 +41,7 @@ VERBS = {
 MODEL_VERBS = {
     'list': 'List the bundles that ship with the package, and your own.',
     'info': "Show a bundle's manifest.",
+    'warm': 'Run a frame through the networks, so that what a provider builds is there.',
     'verify': 'Check the files of a bundle against the checksums of its manifest.',
     'export': 'Export CLIP, CLIPSeg or FastSAM, verify it against its reference, put it in place.',
     'fetch': 'Fetch a named bundle, checked and resumable.',

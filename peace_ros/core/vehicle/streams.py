@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.vehicle.assembler import Assembler
@@ -49,6 +52,11 @@ class StreamKeeper:
             self._wanted_once.append(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
         self._asked_ns: dict[int, int] = {}
         self._reboots = 0
+
+    @property
+    def rates_hz(self) -> Mapping[int, float]:
+        """Message id -> the rate that is asked for."""
+        return MappingProxyType(self._rates_hz)
 
     def due(self, assembler: Assembler, now_ns: int) -> list[Request]:
         """Return the requests to send now."""
