@@ -17,6 +17,7 @@ import typer
 
 from peace_ros import __version__
 from peace_ros.cli.extras import how_to_install
+from peace_ros.cli.options import for_typer
 from peace_ros.core.domain import (
     BundleError,
     ConfigurationError,
@@ -71,7 +72,7 @@ def _add(to: typer.Typer, name: str, summary: str, module: str, function: str) -
         with _in_one_sentence():
             verb = getattr(importlib.import_module(f'peace_ros.cli.{module}'), function)
             own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-            own.command()(verb)
+            own.command()(for_typer(verb))
             status = own(args=context.args, prog_name=context.command_path, standalone_mode=False)
             if isinstance(status, int) and status:
                 raise typer.Exit(status)
@@ -116,6 +117,7 @@ def _show_version(wanted: bool) -> None:
 
 
 @app.callback()
+@for_typer
 def root(
     _version: Annotated[
         bool,

@@ -14,19 +14,13 @@ import time
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from peace_ros.cli import doctor as command
-from peace_ros.cli.main import app
 from peace_ros.lab.doctor.finding import fine, mend, not_checked
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT_S = 10.0
 """For all checks."""
-
-
-def peace(*words: str):
-    return CliRunner().invoke(app, list(words))
 
 
 @pytest.mark.parametrize(
@@ -38,7 +32,7 @@ def peace(*words: str):
     ],
 )
 def test_the_exit_status_and_the_file_tell_what_was_found(
-    findings, status, end, tmp_path, monkeypatch
+    peace, findings, status, end, tmp_path, monkeypatch
 ) -> None:
     monkeypatch.setattr(command, 'examine', lambda *_given: {'Models': findings, 'Camera': []})
     file = tmp_path / 'found.json'
@@ -66,21 +60,21 @@ def test_the_exit_status_and_the_file_tell_what_was_found(
         (('models', 'warm', '--size', '640x9'), '--size'),
     ],
 )
-def test_wrong_arguments_are_refused_in_one_sentence(words, told) -> None:
+def test_wrong_arguments_are_refused_in_one_sentence(peace, words, told) -> None:
     result = peace(*words)
     assert result.exit_code == 2
     assert told in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
 
 
-def test_warming_runs_frames_of_the_camera_and_of_a_given_size() -> None:
+def test_warming_runs_frames_of_the_camera_and_of_a_given_size(peace) -> None:
     result = peace('models', 'warm', '--config', 'dd_cs', '--size', '64x48')
     assert result.exit_code == 0, result.output
     assert 'clipseg-small fp32 on CPUExecutionProvider' in result.stdout
     assert re.search(r'a warm frame of 64 x 48 px takes \d+ ms', result.stdout)
 
 
-def test_warming_with_a_provider_that_is_not_there_fails() -> None:
+def test_warming_with_a_provider_that_is_not_there_fails(peace) -> None:
     result = peace('models', 'warm', '--config', 'dd_cs', '--provider', 'NoSuchProvider')
     assert result.exit_code == 1
     assert 'NoSuchProvider' in result.stdout
