@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from peace_ros.core.domain import Frame, PeaceError
 from peace_ros.core.inference import Bundle
 from peace_ros.core.inference.providers import TENSORRT, engine_folder
+from peace_ros.core.inference.session import providers_of_role
 from peace_ros.core.pipeline import Pipeline, create_generator, segmentation_of
 from peace_ros.core.presets import Preset
 from peace_ros.core.prompting import PromptingParameters
@@ -122,11 +123,13 @@ class Models:
     def _unless_engines_are_missing(self, parameters: Any, create: Callable[[], Any]) -> Any:
         """Load, but do not let TensorRT build engines here, which takes minutes."""
         if TENSORRT in parameters.providers and not self._builds_engines:
-            bundle = Bundle.load(parameters.bundle)
-            for name, entry in bundle.manifest.files.items():
-                folder = engine_folder(entry.sha256)
-                if name.endswith('.onnx') and not any(folder.glob('*.engine')):
-                    self._notes.missing_engine(bundle.manifest.name, name, self._preset.name)
+            manifest = Bundle.load(parameters.bundle).manifest
+            for role, name in manifest.roles.items():
+                chosen = providers_of_role(manifest.family, role, parameters.providers)
+                if TENSORRT not in chosen or not name.endswith('.onnx'):
+                    continue
+                if not any(engine_folder(manifest.files[name].sha256).glob('*.engine')):
+                    self._notes.missing_engine(manifest.name, name, self._preset.name)
                     return None
         return create()
 
