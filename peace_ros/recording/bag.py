@@ -84,6 +84,13 @@ class BagReader:
         except Exception as error:
             # apsw and zstd bring error types of their own, which are not imported here.
             raise self._unreadable(error) from error
+        count = reader.message_count
+        if count and not reader.connections:
+            reader.close()
+            raise RecordingError(
+                f'bag {self.path} holds {count} messages, but its summary lists no '
+                'topics: write it anew with "mcap recover" and give the result'
+            )
         self._reader = reader
         return self
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -174,6 +175,52 @@ def test_a_bag_that_is_cut_short_is_an_error_and_never_a_shorter_bag(tmp_path, p
     cut.write_bytes(whole[: int(part * len(whole))])
     with pytest.raises(RecordingError), BagReader(cut) as bag:
         assert len(list(bag.messages(['/image']))) < 49
+
+
+def test_a_summary_without_topics_is_not_an_empty_bag(tmp_path) -> None:
+    """The format allows to leave channels out of the summary; they stand between the messages."""
+    path = tmp_path / 'bare.mcap'
+    path.write_bytes(_mcap_without_channels_in_its_summary())
+    with (
+        pytest.raises(RecordingError, match=r'holds 1 messages, but .* no topics: .*mcap recover'),
+        BagReader(path),
+    ):
+        pass
+
+
+def _mcap_without_channels_in_its_summary() -> bytes:
+    def record(opcode: int, *parts: bytes) -> bytes:
+        return struct.pack('<BQ', opcode, len(b''.join(parts))) + b''.join(parts)
+
+    def text(value: str) -> bytes:
+        return struct.pack('<I', len(value)) + value.encode()
+
+    inside = (
+        record(3, struct.pack('<H', 1), text('std_msgs/msg/Empty'), text('ros2msg'), text(''))
+        + record(4, struct.pack('<HH', 1, 1), text('/a'), text('cdr'), text(''))
+        + record(5, struct.pack('<HIQQ', 1, 0, 1, 1), bytes([0, 1, 0, 0, 0]))
+    )
+    magic = b'\x89MCAP0\r\n'
+    begin = magic + record(1, text('ros2'), text('test'))
+    times = struct.pack('<QQ', 1, 1)
+    chunk = record(
+        6,
+        times,
+        struct.pack('<QI', len(inside), 0),
+        text(''),
+        struct.pack('<Q', len(inside)),
+        inside,
+    )
+    index = record(7, struct.pack('<HIQQ', 1, 16, 1, 0))
+    data_end = record(15, struct.pack('<I', 0))
+    indexed = record(
+        *(8, times, struct.pack('<QQ', len(begin), len(chunk))),
+        struct.pack('<IHQQ', 10, 1, len(begin + chunk), len(index)),
+        *(text(''), struct.pack('<QQ', len(inside), len(inside))),
+    )
+    start = len(begin + chunk + index + data_end)
+    footer = record(2, struct.pack('<QQI', start, 0, 0))
+    return begin + chunk + index + data_end + indexed + footer + magic
 
 
 def test_a_folder_without_a_bag_is_refused(tmp_path) -> None:
