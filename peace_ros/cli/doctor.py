@@ -93,7 +93,7 @@ def _show(found: Mapping[str, list[Finding]], seconds: float, console: Console) 
         for each in findings:
             text = Text(each.found)
             if each.remedy:
-                text.append(f'\n{each.remedy}', style='cyan')
+                text.append(f'\n-> {each.remedy}', style='cyan')
             table.add_row(_MARKS[each.outcome], text)
         console.print(Padding(table, (0, 0, 0, 2), expand=False))
     count = needs_mending(found)

@@ -128,8 +128,8 @@ def _launch_arguments() -> set[str]:
     declared = {
         row.elts[0].value
         for node in ast.walk(tree)
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == 'ARGUMENTS'
-        for row in ast.walk(node.value)
+        if re.match(r'ARGUMENTS\b', ast.unparse(node)) and isinstance(node, ast.stmt)
+        for row in ast.walk(node)
         if isinstance(row, ast.Tuple) and row.elts and isinstance(row.elts[0], ast.Constant)
     }
     return declared | {

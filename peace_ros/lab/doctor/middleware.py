@@ -11,6 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from peace_ros.core.resources import config_dir
 from peace_ros.lab.doctor.finding import Findings, fine, mend, not_checked
 
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
@@ -85,14 +86,7 @@ def check_shared_memory(rmw: str, frame_bytes: int) -> Findings:
         frame_bytes < segment_bytes == DEFAULT_SEGMENT_BYTES
     )
     if not is_enough:
-        needed_mb = FRAMES_IN_SEGMENT * size_mb
-        yield mend(
-            f'{found}: best-effort images will be lost',
-            f'let {PROFILES[0]} name profiles with a segment of {needed_mb:.0f} MB or more, such '
-            'as config/fastdds.xml of this package with a larger segment_size, for the process of '
-            'the camera too; or use image_transport compressed',
-            **figures,
-        )
+        yield mend(f'{found}: best-effort images will be lost', _larger(frame_bytes), **figures)
         return
     yield fine(found, **figures)
     if _SHARED_MEMORY.is_dir():
@@ -103,6 +97,19 @@ def check_shared_memory(rmw: str, frame_bytes: int) -> Findings:
                 f'nodes take {segment_bytes / 1e6:.1f} MB each',
                 'start the container with a larger --shm-size, or with --ipc=host',
             )
+
+
+def _larger(frame_bytes: int) -> str:
+    """Return how to have a segment for images of this size."""
+    shipped = config_dir() / 'fastdds.xml'
+    needed_bytes = FRAMES_IN_SEGMENT * frame_bytes
+    file = f'{shipped}'
+    if segment_of(shipped) < needed_bytes:
+        file = f'a copy of {shipped} with segment_size {needed_bytes} or more'
+    return (
+        f'let {PROFILES[0]} name {file}, for the camera driver and the nodes; or use '
+        'image_transport compressed'
+    )
 
 
 def segment_of(profiles: Path) -> int:
