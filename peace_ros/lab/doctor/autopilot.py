@@ -40,6 +40,7 @@ NEEDED_SHARE = 0.4
 round to parts of their loop."""
 SLOW_TRIP_MS = 100.0
 """A third of a metre at 3 m/s: the half of it is the error that the time of a pose may have."""
+COMPANION = int(mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
 _READ_S = 0.05
 _VERSION_AGAIN_S = 0.7
 _BOARD_TYPES = {0: 'development', 64: 'alpha', 128: 'beta', 192: 'release candidate', 255: ''}
@@ -62,6 +63,8 @@ class Heard:
     version: tuple[int, int, int, int] | None = None
     """Major, minor, patch, FIRMWARE_VERSION_TYPE; None: not told."""
     position_problem: str = ''
+    has_twin: bool = False
+    """Somebody else speaks as our companion."""
     offset_ns: int | None = None
     round_trip_ms: float | None = None
 
@@ -96,6 +99,7 @@ class AutopilotListener:
         self._assembler: Assembler | None = None
         self._heard: Heard | None = None
         self._bytes = 0
+        self._has_twin = False
         self._counts_from_s = float('inf')
 
     def listen(self) -> Heard:
@@ -129,6 +133,8 @@ class AutopilotListener:
 
     def _take(self, message: Any, source: Any) -> None:
         now_ns = time.monotonic_ns()
+        who = (message.get_srcSystem(), message.get_srcComponent())
+        self._has_twin |= who == (self._parameters.system_id, COMPANION)
         if self._assembler is None:
             if not self._peer.is_candidate(message, source, now_ns):
                 return
@@ -178,6 +184,7 @@ class AutopilotListener:
 
     def _summary(self, heard: Heard, assembler: Assembler) -> Heard:
         heard.counted_s = COUNT_S
+        heard.has_twin = self._has_twin
         heard.mode, heard.armed = assembler.mode, assembler.armed
         heard.position_problem = assembler.position_problem(time.monotonic_ns())
         if not heard.position_problem and not assembler.poses:
@@ -229,6 +236,12 @@ def check_autopilot(url: str, parameters: VehicleParameters, dialect: str = AUTO
     yield from _who(heard, url)
     yield from _streams(heard)
     yield from _time(heard)
+    if heard.has_twin:
+        yield mend(
+            f'another companion speaks as system {parameters.system_id}, component {COMPANION}: '
+            'two of them would both send set-points',
+            'end it, or give one of them another vehicle.system_id',
+        )
     if heard.position_problem:
         yield mend(
             f'engaging would be refused: {heard.position_problem}',

@@ -70,6 +70,7 @@ def test_streams_and_answers_that_are_missing_are_named(in_background, to_mend) 
     assert 'TIMESYNC is not answered' in told
     assert 'engaging would be refused: the autopilot reports no position' in told
     assert 'LOCAL_POSITION_NED' not in told
+    assert 'another companion' not in told
 
 
 @pytest.mark.parametrize(
@@ -94,6 +95,18 @@ def test_another_system_is_named(in_background, to_mend, monkeypatch) -> None:
     ((what, _),) = to_mend(found)
     assert '7/1' in what
     assert 'vehicle_id' in what
+
+
+def test_another_companion_with_our_ids_is_found(in_background, mock_autopilot, to_mend) -> None:
+    twin = mock_autopilot(0, system=1, component=autopilot.COMPANION)
+
+    def speak(speaker):
+        speaker.heartbeat()
+        twin.to = speaker.to
+        twin.heartbeat(autopilot=8, kind=18)
+
+    found, _ = in_background(speak)
+    assert any('another companion speaks as system 1' in what for what, _ in to_mend(found))
 
 
 def test_a_port_that_is_taken_is_said_at_once(free_port, mock_autopilot, to_mend) -> None:
