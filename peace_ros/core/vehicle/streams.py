@@ -41,7 +41,7 @@ class StreamKeeper:
     """Knows which messages are wanted and when each was last asked for."""
 
     def __init__(self, parameters: VehicleParameters, dialect: Dialect) -> None:
-        self._rates_hz: dict[int, float] = {
+        self.rates_hz: dict[int, float] = {
             mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: parameters.pose_rate_hz,
             mavlink.MAVLINK_MSG_ID_ATTITUDE: parameters.pose_rate_hz,
             mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: parameters.state_rate_hz,
@@ -54,10 +54,11 @@ class StreamKeeper:
             mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: TARGET_HZ,
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: HEALTH_HZ,
         }
+        """Message id -> the rate that is asked for."""
         if dialect.heartbeat_rate_hz > 0.0:
-            self._rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
+            self.rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
         if parameters.altitude_source == 'rangefinder':
-            self._rates_hz[mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR] = parameters.pose_rate_hz
+            self.rates_hz[mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR] = parameters.pose_rate_hz
         self._wanted_once = [mavlink.MAVLINK_MSG_ID_HOME_POSITION]
         if not dialect.home_is_local:
             self._wanted_once.append(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
@@ -70,7 +71,7 @@ class StreamKeeper:
             self._reboots = assembler.reboots
             self.forget()
         requests: list[Request] = []
-        for message_id, rate_hz in self._rates_hz.items():
+        for message_id, rate_hz in self.rates_hz.items():
             limit_ns = max(SILENT_NS, round(3e9 / rate_hz))
             silent = now_ns - assembler.arrived_ns.get(message_id, 0) > limit_ns
             if message_id not in self._asked_ns or silent:
