@@ -5,7 +5,8 @@
 ``python -m peace_ros.lab.evaluation.obedience --hours 3`` flies random sequences of set-points
 like those of landings against the physics and the offboard mode of the simulated autopilots, in
 simulated time, with errors of the estimates larger than the measured ones. Then it breaks the
-reported position where a leg begins, and measures how long the watch takes.
+reported position, with or without the velocity, where a leg begins, and measures how long the
+watch takes.
 """
 
 from __future__ import annotations
@@ -13,12 +14,16 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from math import cos, hypot, pi, sin
 from random import Random
 
-from peace_ros.core.vehicle.obedience import ObedienceWatch
+from peace_ros.core.domain import Pose, Setpoint
+from peace_ros.core.domain.geometry import lean_acceleration
+from peace_ros.core.landing.drift import Drift
+from peace_ros.core.vehicle.obedience import ObedienceWatch, ReportedMotion
 from peace_ros.lab.evaluation.wind import flying
 from peace_ros.simulation.autopilot.estimate_errors import PX4_ERRORS, ErrorSizes, EstimateErrors
 from peace_ros.simulation.autopilot.guided import PositionTarget
@@ -35,22 +40,32 @@ _DELAY_S = 0.06
 _STALL_SHARE, _STALL_S = 0.02, 0.45
 """After so many reports none comes for so long, as on a busy machine."""
 _FLIGHT_S = 180.0
-_HOVER_S = 6.0
+_HOVER_S, _HOVER_M_S = 6.0, 1.5
+_FASTEST_M_S = 5.0
+_LEVEL = (1.0, 0.0, 0.0, 0.0)
 _GUST_SHARE = 0.3
 _VELOCITY_AND_RATE = 0x5C7
 _LOCAL_NED = 1
 _GUIDE_GAIN = 0.5
 
 Plane = tuple[float, float]
-Reported = Callable[[Plane], Plane]
-"""True way since the fault began -> reported one."""
-FAULTS: dict[str, Reported] = {
-    'swapped axes': lambda way: (way[1], way[0]),
-    'swapped signs': lambda way: (-way[0], -way[1]),
-    'frozen': lambda _: (0.0, 0.0),
-    'frozen, with noise': lambda _: (0.0, 0.0),
+FAULTS: dict[str, tuple[Plane, Plane]] = {
+    'swapped axes': ((0.0, 1.0), (1.0, 0.0)),
+    'swapped signs': ((-1.0, 0.0), (0.0, -1.0)),
+    'frozen': ((0.0, 0.0), (0.0, 0.0)),
+    'frozen, with noise': ((0.0, 0.0), (0.0, 0.0)),
 }
-_NOISY = 'frozen, with noise'
+"""Reported way since the fault began (rows: north, east) of the true one."""
+_EXACT = 'frozen'
+
+
+@dataclass(frozen=True)
+class BrokenLeg:
+    """What is broken, and the speed of the leg that shows it."""
+
+    fault: str
+    velocity_too: bool
+    speed_m_s: float
 
 
 @dataclass(frozen=True)
@@ -87,42 +102,52 @@ class WatchedFlight:
         self.flight = flying(physics, Personality(kind), EstimateErrors(sizes, seed))
         self.watch = ObedienceWatch()
         self._line = Random(seed)
-        self.fault = ''
+        self._fault, self._velocity_too = '', False
         self._fault_at_m: Plane = (0.0, 0.0)
-        self._reports: deque[tuple[float, tuple[float, float, float]]] = deque()
+        self._reports: deque[tuple[float, ReportedMotion]] = deque()
         self._due_s = self.flight.time_s
 
     @property
     def seen_m(self) -> tuple[float, float, float]:
         """The position that is reported now."""
         north, east, down = self.flight.position_m
-        if not self.fault:
+        if not self._fault:
             return north, east, down
-        noise = self.flight.errors.position_m
         physics, begun = self.flight.physics, self._fault_at_m
-        if self.fault == 'frozen':
-            noise = (0.0, 0.0)
-        way = FAULTS[self.fault]((physics.north_m - begun[0], physics.east_m - begun[1]))
+        way = self._distorted((physics.north_m - begun[0], physics.east_m - begun[1]))
+        noise = (0.0, 0.0) if self._fault == _EXACT else self.flight.errors.position_m
         return begun[0] + way[0] + noise[0], begun[1] + way[1] + noise[1], down
 
-    def break_position(self, fault: str) -> None:
+    @property
+    def seen_m_s(self) -> Plane:
+        """The horizontal velocity that is reported now."""
+        north, east, _ = self.flight.velocity_m_s
+        return self._distorted((north, east)) if self._velocity_too else (north, east)
+
+    def _distorted(self, way: Plane) -> Plane:
+        (nn, ne), (en, ee) = FAULTS[self._fault]
+        return nn * way[0] + ne * way[1], en * way[0] + ee * way[1]
+
+    def break_position(self, fault: str, *, velocity_too: bool) -> None:
         """Put in a fault; the position goes on from where it is."""
-        self.fault = fault
+        self._fault, self._velocity_too = fault, velocity_too
         self._fault_at_m = (self.flight.physics.north_m, self.flight.physics.east_m)
 
     def tick(self, velocity: tuple[float, float, float]) -> str:
         """Fly on with a set-point; return why the position is not believed."""
         flight = self.flight
         flight.take_velocity(PositionTarget(_LOCAL_NED, _VELOCITY_AND_RATE, velocity))
-        self.watch.tell(velocity)
+        self.watch.tell(velocity, round(flight.time_s * 1e9))
         flight.step(_TICK_S)
         if flight.time_s + 1e-9 >= self._due_s:
             stalls = self._line.random() < _STALL_SHARE
             self._due_s += _STALL_S if stalls else _REPORT_S
-            self._reports.append((flight.time_s, self.seen_m))
+            lean = lean_acceleration(flight.physics.quaternion_ned_frd)
+            motion = ReportedMotion(self.seen_m, self.seen_m_s, lean)
+            self._reports.append((flight.time_s, motion))
         while self._reports and self._reports[0][0] + _DELAY_S <= flight.time_s:
-            at_s, seen_m = self._reports.popleft()
-            self.watch.take(seen_m, round(at_s * 1e9))
+            at_s, motion = self._reports.popleft()
+            self.watch.take(motion, round(at_s * 1e9))
         return self.watch.problem
 
     def guided(self, target_m: Plane, limit_m_s: float) -> Plane:
@@ -160,17 +185,27 @@ def accusation(flown: WatchedFlight, seconds: float) -> str:
     return ''
 
 
-def find(flown: WatchedFlight, fault: str, speed_m_s: float) -> Found:
-    """Hover over a place, break the position, tell one leg; return when it was found."""
-    place = flown.seen_m[:2]
+def find(flown: WatchedFlight, broken: BrokenLeg) -> Found:
+    """Hover over a place, break the position, tell one leg; return when it was found.
+
+    As in a landing, what the vehicle is told makes up for its drift: a vehicle that truly goes to
+    the north-east while it is told to go north shows no swapped axes.
+    """
+    place, drift, told = flown.seen_m[:2], Drift(), Setpoint(0)
     until_s = flown.flight.time_s + _HOVER_S
     while flown.flight.time_s < until_s:
-        flown.tick((*flown.guided(place, 1.5), 0.0))
-    flown.break_position(fault)
+        north, east, down = flown.seen_m
+        stamp_ns = round(flown.flight.time_s * 1e9)
+        drift.see(Pose(stamp_ns, north, east, down, _LEVEL, -down), told)
+        told = drift.made_up(Setpoint(0, *flown.guided(place, _HOVER_M_S)), _HOVER_M_S)
+        flown.tick((told.v_north_m_s, told.v_east_m_s, 0.0))
+    flown.break_position(broken.fault, velocity_too=broken.velocity_too)
     turn = flown.random.uniform(0.0, 2.0 * pi)
-    if fault == 'swapped axes':  # a leg to the north-east looks the same
+    if broken.fault == 'swapped axes':  # a leg to the north-east looks the same
         turn = flown.random.choice((0.0, 0.5, 1.0, 1.5)) * pi + flown.random.uniform(-0.25, 0.25)
-    velocity = (speed_m_s * cos(turn), speed_m_s * sin(turn), 0.0)
+    wish = Setpoint(0, broken.speed_m_s * cos(turn), broken.speed_m_s * sin(turn))
+    told = drift.made_up(wish, _FASTEST_M_S)
+    velocity = (told.v_north_m_s, told.v_east_m_s, 0.0)
     begin_s, physics = flown.flight.time_s, flown.flight.physics
     begun = (physics.north_m, physics.east_m)
     while flown.flight.time_s < begin_s + 20.0:
@@ -207,24 +242,24 @@ def main(args: Sequence[str] | None = None) -> int:
         hours = flights * _FLIGHT_S / 3600.0
         sys.stdout.write(f'{kind.value}: {false} false accusations in {hours:g} h\n')
         failed += false
-        for fault in FAULTS:
+        for fault, velocity_too in product(FAULTS, (True, False)):
             for speed_m_s in LEG_SPEEDS_M_S:
-                failed += given.trials - _trials(kind, size, fault, speed_m_s, given)
+                broken = BrokenLeg(fault, velocity_too, speed_m_s)
+                failed += given.trials - _trials(kind, size, broken, given)
     return 0 if failed == 0 else 1
 
 
-def _trials(
-    kind: Kind, size: ErrorSizes, fault: str, speed_m_s: float, given: argparse.Namespace
-) -> int:
+def _trials(kind: Kind, size: ErrorSizes, broken: BrokenLeg, given: argparse.Namespace) -> int:
     all_found = []
     for seed in range(given.seed, given.seed + given.trials):
         wind_m_s = Random(seed).uniform(0.0, given.wind)
-        all_found.append(find(WatchedFlight(kind, size, wind_m_s, seed), fault, speed_m_s))
+        all_found.append(find(WatchedFlight(kind, size, wind_m_s, seed), broken))
     count = sum(each.in_time for each in all_found)
     if all_found:
+        of = 'position and velocity' if broken.velocity_too else 'position only'
         sys.stdout.write(
-            f'{kind.value}, {fault} at {speed_m_s:g} m/s: {count} of {len(all_found)} within '
-            f'{TIME_LIMIT_S:g} s and {WAY_LIMIT_M:g} m; the latest after '
+            f'{kind.value}, {of}, {broken.fault} at {broken.speed_m_s:g} m/s: {count} of '
+            f'{len(all_found)} within {TIME_LIMIT_S:g} s and {WAY_LIMIT_M:g} m; the latest after '
             f'{max(each.seconds for each in all_found):g} s, '
             f'{max(each.way_m for each in all_found):g} m\n'
         )
