@@ -39,7 +39,7 @@ OFFSET_M_S, OFFSET_TIME_S = 0.1, 5.0
 """The same of the reported velocity against what was told,"""
 CALM_M2_S = 0.03
 """in calm air. Gusts add to it,"""
-WINDY_M_S2, WINDY_POWER = 4.0, 4
+WINDY_M_S2, WINDY_POWER = 3.7, 4
 """as much where the vehicle holds against the wind with this acceleration, as its lean shows (about
 8 m/s), and steeply more above: what is left to answer a gust with becomes less."""
 WIND_TIME_S = 5.0
