@@ -77,7 +77,7 @@ class ObedienceWatch:
         self._marks: deque[_Mark] = deque()
         self._axes = AxesWatch()
         self._told_m = 0.0
-        # Never changed in place: the thread that tells is not the one that takes.
+        # Not changed in place: another thread may tell while this one takes.
         self._told: tuple[tuple[float, Vector], ...] = ((-inf, (0.0, 0.0, 0.0)),)
 
     def tell(self, velocity_m_s: Vector, steady_ns: int) -> None:
