@@ -159,9 +159,9 @@ class Assembler:
         return self._home.home_msl_m
 
     @property
-    def reported_ns(self) -> int:
-        """The autopilot's clock of the newest believed position, 0 before the first."""
-        return 0 if self._position is None else self._position.report.boot_ms * 1_000_000
+    def report(self) -> PoseReport | None:
+        """The newest believed position, None before the first."""
+        return None if self._position is None else self._position.report
 
     def heartbeat_age_s(self, steady_ns: int) -> float:
         """Return the time since the newest HEARTBEAT, infinite before the first."""
@@ -173,9 +173,11 @@ class Assembler:
         """Return why there is no position to fly by, empty when nothing speaks against it."""
         flags = self._estimator_flags(steady_ns)
         if flags is not None and not _has_position(flags):
+            fix = f' ({self._gnss.fix_note})' if self._gnss.fix_note else ''
             return (
                 f'the autopilot has no estimate of its position (filter flags 0x{flags:X}) and '
-                'refuses velocity set-points: it needs GNSS, external navigation or optical flow'
+                f'refuses velocity set-points: it needs GNSS{fix}, external navigation or optical '
+                'flow'
             )
         return self._absurd or self._gnss.problem or self._watch.problem
 
