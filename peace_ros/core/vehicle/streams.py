@@ -19,7 +19,14 @@ HEIGHT_HZ = 10.0
 ESTIMATOR_HZ = 4.0
 FIX_HZ = 10.0
 """A descent by GNSS has to stop within 1 s of a lost fix."""
-MAYBE = frozenset({mavlink.MAVLINK_MSG_ID_GPS2_RAW})
+TERRAIN_HZ = 1.0
+MAYBE = frozenset(
+    {
+        mavlink.MAVLINK_MSG_ID_GPS2_RAW,
+        mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR,
+        mavlink.MAVLINK_MSG_ID_TERRAIN_REPORT,
+    }
+)
 """Asked for once: not every vehicle has it."""
 
 Request = tuple[int, tuple[float, float]]
@@ -39,11 +46,15 @@ class StreamKeeper:
             dialect.height_message: HEIGHT_HZ,
             mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: FIX_HZ,
             mavlink.MAVLINK_MSG_ID_GPS2_RAW: FIX_HZ,
+            mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: HEIGHT_HZ,
+            mavlink.MAVLINK_MSG_ID_TERRAIN_REPORT: TERRAIN_HZ,
         }
         if dialect.heartbeat_rate_hz > 0.0:
             self._rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
+        self._optional = {*MAYBE}
         if parameters.altitude_source == 'rangefinder':
             self._rates_hz[mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR] = parameters.pose_rate_hz
+            self._optional.remove(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
         self._wanted_once = [mavlink.MAVLINK_MSG_ID_HOME_POSITION]
         if not dialect.home_is_local:
             self._wanted_once.append(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
@@ -59,7 +70,7 @@ class StreamKeeper:
         for message_id, rate_hz in self._rates_hz.items():
             limit_ns = max(SILENT_NS, round(3e9 / rate_hz))
             silent = now_ns - assembler.arrived_ns.get(message_id, 0) > limit_ns
-            if message_id not in self._asked_ns or (silent and message_id not in MAYBE):
+            if message_id not in self._asked_ns or (silent and message_id not in self._optional):
                 request = (
                     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
                     (float(message_id), 1e6 / rate_hz),
