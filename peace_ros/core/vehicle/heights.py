@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain.motion import HeightReport
+from peace_ros.core.vehicle.trust import Pairwise
 
 HOME_STEP_M = 1.0
 """A home whose height changes by more than this in flight says nothing about the ground below."""
@@ -98,9 +100,14 @@ def height_of(message: Any, steady_ns: int) -> Height | None:
 
 
 class OtherHeights:
-    """Heights that do not rest on the barometer: GNSS (GPS_RAW_INT), terrain data, rangefinder."""
+    """Heights that do not rest on the barometer: GNSS (GPS_RAW_INT), terrain data, rangefinder.
 
-    def __init__(self) -> None:
+    Args:
+        limit_m: One that is farther from the message before it needs a second message.
+    """
+
+    def __init__(self, limit_m: float) -> None:
+        self._pairs: defaultdict[str, Pairwise] = defaultdict(lambda: Pairwise(limit_m))
         self._newest: dict[str, tuple[int, HeightReport]] = {}
 
     def fresh(self, steady_ns: int, level_share: float) -> tuple[HeightReport, ...]:
@@ -138,4 +145,5 @@ class OtherHeights:
         self._keep(steady_ns, report)
 
     def _keep(self, steady_ns: int, report: HeightReport) -> None:
-        self._newest[report.source] = (steady_ns, report)
+        if self._pairs[report.source].believes(report.height_m):
+            self._newest[report.source] = (steady_ns, report)

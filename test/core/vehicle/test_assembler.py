@@ -335,6 +335,16 @@ def test_what_is_no_height_is_not_reported(assembler, good, bad, rejected):
     assert assembler.rejected == rejected
 
 
+def test_a_single_message_moves_no_other_height(assembler):
+    assembler.take(position(), 0, 0)
+    assembler.take(attitude(), 0, 0)
+    told = []
+    for altitude_m in (615.0, 700.0, 616.0, 616.0, 640.0, 640.0):
+        assembler.take(fix(altitude_m), 0, 0)
+        told.append(assembler.telemetry(0).heights[0].height_m)
+    assert told == [615.0, 615.0, 615.0, 616.0, 616.0, 640.0]
+
+
 def test_long_texts_are_put_together(assembler):
     for chunk, text in enumerate((b'x' * 50, b'yz')):
         assembler.take(mavlink.MAVLink_statustext_message(4, text, 7, chunk), 0, 0)
