@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from math import inf
 
 from peace_ros.core.domain import HeightReport, Pose
 from peace_ros.core.landing.parameters import LandingParameters
@@ -102,23 +103,25 @@ class HeightWatch:
                 a roof or a tree.
         """
         heights_m: dict[str, float] = {}
-        altitude_m = lowest_m = 0.0 if pose is None else pose.altitude_agl_m
+        altitude_m = 0.0 if pose is None else pose.altitude_agl_m
+        heard: list[tuple[float, float]] = []
         agree = True
         for each in () if pose is None else reports:
             source = self._sources.setdefault(each.source, _Source())
             if each.is_narrow and not (over_site or source.doubt):
                 continue
             height_m = heights_m[each.source] = source.height_m(each, altitude_m)
-            error_m = _ERRORS * each.error_m
-            lowest_m = min(lowest_m, height_m + error_m)
-            limit_m = max(_LEAST_LIMIT_M, self._p.height_share * min(altitude_m, height_m))
+            heard.append((height_m, each.error_m))
+            share_m = self._p.height_share * min(altitude_m, height_m)
+            limit_m = max(_LEAST_LIMIT_M, share_m) + _ERRORS * each.error_m
             sentence = (
                 f'the altitude above ground is {altitude_m:.1f} m by the autopilot and '
-                f'{height_m:.1f} m by {each.source} (limit {limit_m + error_m:.1f} m apart): '
+                f'{height_m:.1f} m by {each.source} (limit {limit_m:.1f} m apart): '
                 'holding until they agree'
             )
             off_m = abs(height_m - altitude_m)
-            agree &= source.judge(now_ns, off_m, limit_m + error_m, sentence)
+            agree &= source.judge(now_ns, off_m, limit_m, sentence)
+        lowest_m = min(altitude_m, _lowest_m(heard))
         return HeightSight(
             problem='; '.join(each.doubt for each in self._sources.values() if each.doubt),
             above_lowest_m=altitude_m - lowest_m,
@@ -134,3 +137,14 @@ class HeightWatch:
         if self._low_ns is None:
             self._low_ns = now_ns
         return now_ns - self._low_ns >= _SETTLE_NS
+
+
+def _lowest_m(heard: list[tuple[float, float]]) -> float:
+    """Return the lowest of heights with their standard errors, infinite without any.
+
+    The most precise one counts one error higher than it says, the others three, so that noise
+    does not lift a floor that a precise source confirms.
+    """
+    least_m = min((error_m for _, error_m in heard), default=0.0)
+    shares = ((h, e if e == least_m else _ERRORS * e) for h, e in heard)
+    return min((height_m + error_m for height_m, error_m in shares), default=inf)
