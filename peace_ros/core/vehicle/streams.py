@@ -20,9 +20,12 @@ HEIGHT_HZ = 10.0
 ESTIMATOR_HZ = 4.0
 FIX_HZ = 10.0
 """A descent by GNSS has to stop within 1 s of a lost fix."""
+TERRAIN_HZ = 1.0
 MAYBE = frozenset(
     {
         mavlink.MAVLINK_MSG_ID_GPS2_RAW,
+        mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR,
+        mavlink.MAVLINK_MSG_ID_TERRAIN_REPORT,
         mavlink.MAVLINK_MSG_ID_FENCE_STATUS,
         mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
         mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
@@ -50,6 +53,8 @@ class StreamKeeper:
             dialect.height_message: HEIGHT_HZ,
             mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: FIX_HZ,
             mavlink.MAVLINK_MSG_ID_GPS2_RAW: FIX_HZ,
+            mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: HEIGHT_HZ,
+            mavlink.MAVLINK_MSG_ID_TERRAIN_REPORT: TERRAIN_HZ,
             mavlink.MAVLINK_MSG_ID_FENCE_STATUS: FENCE_HZ,
             mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: TARGET_HZ,
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: HEALTH_HZ,
@@ -57,8 +62,10 @@ class StreamKeeper:
         """Message id -> the rate that is asked for."""
         if dialect.heartbeat_rate_hz > 0.0:
             self.rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
+        self._optional = {*MAYBE}
         if parameters.altitude_source == 'rangefinder':
             self.rates_hz[mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR] = parameters.pose_rate_hz
+            self._optional.remove(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
         self._wanted_once = [mavlink.MAVLINK_MSG_ID_HOME_POSITION]
         if not dialect.home_is_local:
             self._wanted_once.append(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
@@ -75,7 +82,7 @@ class StreamKeeper:
             limit_ns = max(SILENT_NS, round(3e9 / rate_hz))
             silent = now_ns - assembler.arrived_ns.get(message_id, 0) > limit_ns
             if message_id not in self._asked_ns or silent:
-                again_ns = MAYBE_AGAIN_NS if message_id in MAYBE else ASK_AGAIN_NS
+                again_ns = MAYBE_AGAIN_NS if message_id in self._optional else ASK_AGAIN_NS
                 request = (
                     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
                     (float(message_id), 1e6 / rate_hz),
