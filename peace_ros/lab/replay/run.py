@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from math import degrees
 from pathlib import Path
 
 from peace_ros.core.domain import Camera, PeaceError, RecordingError
@@ -139,7 +140,7 @@ class Replayer:
         height, width = taken.frame.image_rgb.shape[:2]
         return ReplayLine(
             self._preset,
-            Camera(width, height, self._source.fov_x_rad),
+            Camera.from_degrees(width, height, degrees(self._source.fov_x_rad)),
             self._source.poses,
             self._source.engage_ns,
             threads=self._threads,
