@@ -8,7 +8,6 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -44,15 +43,15 @@ def ros() -> Iterator[None]:
     rclpy.try_shutdown()
 
 
-@dataclass
 class Heatmaps:
     """Publishes heatmaps as segmentation does, with what took their frames."""
 
-    heatmaps: Any
-    frame_infos: Any
-    frame_size_px: tuple[int, int] | None = (352, 352)
-    """None: nothing says what took the frames."""
-    camera: Camera | None = None
+    def __init__(self, heatmaps: Any, frame_infos: Any) -> None:
+        self.heatmaps = heatmaps
+        self.frame_infos = frame_infos
+        self.frame_size_px: tuple[int, int] | None = (352, 352)
+        """None: nothing says what took the frames."""
+        self.camera: Camera | None = None
 
     def publish(self, safety: np.ndarray, at_ns: int) -> None:
         if self.frame_size_px is not None:

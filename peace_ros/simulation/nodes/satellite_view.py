@@ -53,8 +53,9 @@ class SatelliteViewNode(PeaceNode):
         """
         super().__init__('satellite_view', *SATELLITE_VIEW, **options)
         chosen = self.filled(SatelliteViewOptions)
-        self._camera = self.filled(CameraOptions).camera
-        self._view = NadirCamera(create_world(chosen), self._camera)
+        placed = self.filled(CameraOptions)
+        self._camera = replace(placed.camera, distortion=chosen.lens)
+        self._view = NadirCamera(create_world(chosen), self._camera, placed.mount)
         self._period_ns = round(1e9 / chosen.rate)
         self._due_ns: int | None = None
         self._said_mirrored = False
