@@ -11,8 +11,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'peace_ros'
-LINES_OF_WHAT_FLIES = 15_650
-"""Of core and nodes: 14,800, and what knows lens, mount and shape of the camera."""
+LINES_OF_WHAT_FLIES = 15_750
+"""Of core and nodes: 14,800, and what knows lens, mount, shape and encodings of the camera."""
 LINES_OF_A_NODE_FILE = 200
 
 

@@ -159,12 +159,14 @@ class WindFlight:
         """At the end of the landing: of the site by the map, and the true one below the vehicle."""
 
     def map_error_m(self) -> float:
-        """Return how far the middle of what the map calls safe is from that of the island."""
+        """Return how far the middle of the largest safe ground of the map is from the island's."""
         layers = self._core.safety_map.layers(round(self._now_s * 1e9))
-        places = np.argwhere(layers.score > _SAFE_SCORE)
-        if len(places) == 0:
+        safe = (layers.score > _SAFE_SCORE).astype(np.uint8)
+        count, _, sizes, centres = cv2.connectedComponentsWithStats(safe)
+        if count < 2:
             return inf
-        north, east = layers.centre_of(*places.mean(axis=0))
+        column, row = centres[1 + int(np.argmax(sizes[1:, cv2.CC_STAT_AREA]))]
+        north, east = layers.centre_of(row, column)
         return hypot(north - self.island_m[0], east - self.island_m[1])
 
     @property
