@@ -6,26 +6,41 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import radians
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import Annotated, Any, Protocol
 
 from typer import Option
 
-from peace_ros.core.domain import Frame, ImageError, Pose, RecordingError, VehicleError
+from peace_ros.core.domain import (
+    NADIR,
+    Camera,
+    ConfigurationError,
+    Frame,
+    Mount,
+    PeaceError,
+    Pose,
+    RecordingError,
+    VehicleError,
+)
+from peace_ros.core.domain.geometry import mount_from_degrees
 from peace_ros.core.messages import (
+    camera_info_topic,
     diagnostic_values,
     frame_from_message,
+    is_rectified,
     pose_from_message,
     stamp_ns_of,
 )
+from peace_ros.core.transforms import StaticTransforms
 from peace_ros.recording import AltitudeProfile, BagReader, VideoReader
-from peace_ros.recording.messages import IMAGE_TYPES, POSE_TYPES, fov_x_rad_of
+from peace_ros.recording.messages import IMAGE_TYPES, POSE_TYPES
 from peace_ros.recording.video import VIDEO_SUFFIXES
 
 DEFAULT_FOV_DEG = 73.0
 DEFAULT_ALTITUDE = '100:20'
 _CAMERA_INFO = 'sensor_msgs/msg/CameraInfo'
+_TF_STATIC, _VEHICLE_FRAME = '/tf_static', 'base_link'
+_LARGEST_TURN_DEG = 360.0
 _STATUS_TOPIC = '/landing/status'
 _PREFERRED_IMAGES = ('/image', '/image/compressed')
 _PREFERRED_POSES = ('/ground_truth/pose', '/pose')
@@ -50,7 +65,25 @@ class SourceOptions:
         Option(
             '--fov',
             metavar='DEG',
-            help='Full horizontal field of view; default camera_info, else 73.',
+            help='Full horizontal field of view; default: the camera_info beside the image, '
+            'else 73.',
+        ),
+    ] = None
+    mount_roll_deg: Annotated[
+        float | None,
+        Option('--mount-roll', metavar='DEG', help='The camera looks so far to the left.'),
+    ] = None
+    mount_pitch_deg: Annotated[
+        float | None,
+        Option('--mount-pitch', metavar='DEG', help='The camera looks so far ahead.'),
+    ] = None
+    mount_yaw_deg: Annotated[
+        float | None,
+        Option(
+            '--mount-yaw',
+            metavar='DEG',
+            help='The top of the image is so far to the right of the nose; default of all three: '
+            '/tf_static from base_link to the frame_id of the images, else 0.',
         ),
     ] = None
     altitude: Annotated[
@@ -71,6 +104,28 @@ class SourceOptions:
             raise RecordingError(f'--limit {self.limit}: give 1 or more')
         if self.fov_x_deg is not None and not 5.0 <= self.fov_x_deg <= 150.0:
             raise RecordingError(f'--fov {self.fov_x_deg} deg: give 5 to 150')
+        for name, turn_deg in zip(('roll', 'pitch', 'yaw'), self._turns_deg, strict=True):
+            if turn_deg is not None and not abs(turn_deg) <= _LARGEST_TURN_DEG:
+                raise RecordingError(
+                    f'--mount-{name} {turn_deg} deg: give -{_LARGEST_TURN_DEG:g} to '
+                    f'{_LARGEST_TURN_DEG:g}'
+                )
+
+    @property
+    def _turns_deg(self) -> tuple[float | None, float | None, float | None]:
+        return self.mount_roll_deg, self.mount_pitch_deg, self.mount_yaw_deg
+
+    @property
+    def mount(self) -> Mount | None:
+        """How the user says that the camera is mounted, None where nothing was said."""
+        roll, pitch, yaw = self._turns_deg
+        if roll is pitch is yaw is None:
+            return None
+        return mount_from_degrees((roll or 0.0, pitch or 0.0, yaw or 0.0), (0.0, 0.0, 0.0))
+
+    def assumed_camera(self, width_px: int, height_px: int) -> Camera:
+        """Return the camera of frames of a size that come without a calibration."""
+        return Camera.from_degrees(width_px, height_px, self.fov_x_deg or DEFAULT_FOV_DEG)
 
 
 @dataclass(frozen=True)
@@ -88,7 +143,9 @@ class RecordingSource(Protocol):
     path: Path
     count: int
     """About how many frames :meth:`frames` yields."""
-    fov_x_rad: float
+    options: SourceOptions
+    mount: Mount
+    """How the camera sits on the vehicle."""
     poses: list[Pose]
     """In the order of their stamps."""
     engage_ns: int | None
@@ -134,17 +191,17 @@ class VideoSource:
 
     def __init__(self, path: Path, options: SourceOptions) -> None:
         self.path = path
-        self._options = options
+        self.options = options
+        self.mount = options.mount or NADIR
         self._reader = VideoReader(path, AltitudeProfile.parse(options.altitude))
         self.count = _Picker(options).about(self._reader.count)
-        self.fov_x_rad = radians(options.fov_x_deg or DEFAULT_FOV_DEG)
         self.poses = [self._reader.pose(index) for index in range(self._reader.count)]
         self.engage_ns: int | None = None
         self.frame_hz = self._reader.frame_hz / options.every
 
     def frames(self) -> Iterator[Taken]:
         """Yield the chosen frames; raises RecordingError when the file breaks off."""
-        picker = _Picker(self._options)
+        picker = _Picker(self.options)
         for _, frame in self._reader.frames():
             if picker.takes(frame.stamp_ns):
                 yield Taken(frame.stamp_ns, frame)
@@ -153,11 +210,11 @@ class VideoSource:
 
 
 class BagSource:
-    """An image topic and a pose topic of a bag."""
+    """An image topic, its camera_info, and a pose topic of a bag."""
 
     def __init__(self, path: Path, options: SourceOptions) -> None:
         self.path = path
-        self._options = options
+        self.options = options
         with BagReader(path) as bag:
             self.image_topic = _choose(
                 bag, options.image_topic, IMAGE_TYPES, _PREFERRED_IMAGES, '--image-topic'
@@ -171,15 +228,22 @@ class BagSource:
                     f'topic {self.image_topic} of bag {path} has 0 messages: choose another'
                 )
             self.poses = _poses(bag, self.pose_topic)
-            self.fov_x_rad = _field_of_view(bag, options)
+            frame_id = _first(bag, self.image_topic).header.frame_id
+            self._info_topic = _info_topic(bag, self.image_topic, frame_id, options)
+            self._first_info = None if self._info_topic is None else _first(bag, self._info_topic)
+            self.mount = options.mount or _recorded_mount(bag, frame_id)
             self.engage_ns = _engaged_ns(bag)
 
     def frames(self) -> Iterator[Taken]:
         """Yield the chosen frames; those that cannot be decoded with their fault."""
-        picker = _Picker(self._options)
-        last_ns = -1
+        picker = _Picker(self.options)
+        last_ns, info = -1, self._first_info
+        topics = [self.image_topic, *([] if self._info_topic is None else [self._info_topic])]
         with BagReader(self.path) as bag:
-            for _, _, message in bag.messages([self.image_topic]):
+            for topic, _, message in bag.messages(topics):
+                if topic == self._info_topic:
+                    info = message
+                    continue
                 stamp_ns = stamp_ns_of(message)
                 if not picker.takes(stamp_ns):
                     continue
@@ -189,8 +253,9 @@ class BagSource:
                     continue
                 last_ns = stamp_ns
                 try:
-                    yield Taken(stamp_ns, frame_from_message(message))
-                except ImageError as error:
+                    rectified = is_rectified(self.image_topic)
+                    yield Taken(stamp_ns, frame_from_message(message, info, rectified=rectified))
+                except PeaceError as error:
                     yield Taken(stamp_ns, None, str(error))
                 if picker.is_done:
                     return
@@ -247,13 +312,53 @@ def _poses(bag: BagReader, topic: str) -> list[Pose]:
     ]
 
 
-def _field_of_view(bag: BagReader, options: SourceOptions) -> float:
+def _first(bag: BagReader, topic: str) -> Any:
+    for _, _, message in bag.messages([topic]):
+        return message
+    raise RecordingError(f'topic {topic} of bag {bag.path} has 0 messages: choose another')
+
+
+def _info_topic(
+    bag: BagReader, image_topic: str, frame_id: str, options: SourceOptions
+) -> str | None:
+    """Return the topic of the calibration of the images, None where there is none to be used.
+
+    Raises:
+        RecordingError: it holds no calibration, or there are only those of other cameras.
+    """
     if options.fov_x_deg is not None:
-        return radians(options.fov_x_deg)
-    for topic in bag.find([_CAMERA_INFO]):
-        for _, _, message in bag.messages([topic]):
-            return fov_x_rad_of(message)
-    return radians(DEFAULT_FOV_DEG)
+        return None
+    found = [topic for topic in bag.find([_CAMERA_INFO]) if bag.count(topic)]
+    own = camera_info_topic(image_topic)
+    if own not in found:
+        same = [each for each in found if _first(bag, each).header.frame_id == frame_id]
+        if len(same) != 1:
+            if not found:
+                return None
+            raise RecordingError(
+                f'bag {bag.path}: none of {", ".join(found)} is beside {image_topic}, and '
+                f'{len(same)} of them have its frame_id {frame_id!r}: give --fov'
+            )
+        own = same[0]
+    info = _first(bag, own)
+    focal_px = float((info.p if is_rectified(image_topic) else info.k)[0])
+    if not focal_px > 0.0:
+        raise RecordingError(
+            f'{own} of bag {bag.path} with focal length {focal_px} px is not calibrated: give --fov'
+        )
+    return own
+
+
+def _recorded_mount(bag: BagReader, frame_id: str) -> Mount:
+    """Return the mount by /tf_static, nadir where it says nothing of the camera."""
+    transforms = StaticTransforms()
+    if bag.topics.get(_TF_STATIC) == 'tf2_msgs/msg/TFMessage':
+        for _, _, message in bag.messages([_TF_STATIC]):
+            transforms.add(message)
+    try:
+        return transforms.mount(_VEHICLE_FRAME, frame_id)
+    except ConfigurationError:
+        return NADIR
 
 
 def _engaged_ns(bag: BagReader) -> int | None:
