@@ -5,16 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import isfinite
 from pathlib import Path
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Protocol
 
 from typer import Option
 
 from peace_ros.core.domain import (
     NADIR,
     Camera,
-    ConfigurationError,
     Frame,
     Mount,
     PeaceError,
@@ -24,23 +25,22 @@ from peace_ros.core.domain import (
 )
 from peace_ros.core.domain.geometry import mount_from_degrees
 from peace_ros.core.messages import (
-    camera_info_topic,
     diagnostic_values,
     frame_from_message,
     is_rectified,
     pose_from_message,
     stamp_ns_of,
 )
-from peace_ros.core.transforms import StaticTransforms
+from peace_ros.lab.replay.calibration import DEFAULT_FOV_DEG, RecordedCalibration
 from peace_ros.recording import AltitudeProfile, BagReader, VideoReader
 from peace_ros.recording.messages import IMAGE_TYPES, POSE_TYPES
+from peace_ros.recording.storages import STORAGES, is_recording
 from peace_ros.recording.video import VIDEO_SUFFIXES
 
-DEFAULT_FOV_DEG = 73.0
 DEFAULT_ALTITUDE = '100:20'
-_CAMERA_INFO = 'sensor_msgs/msg/CameraInfo'
-_TF_STATIC, _VEHICLE_FRAME = '/tf_static', 'base_link'
 _LARGEST_TURN_DEG = 360.0
+_CLOCKS_APART_S = 3600.0
+"""A recording may begin long before its first image; clocks that differ, differ by more."""
 _STATUS_TOPIC = '/landing/status'
 _PREFERRED_IMAGES = ('/image', '/image/compressed')
 _PREFERRED_POSES = ('/ground_truth/pose', '/pose')
@@ -89,6 +89,15 @@ class SourceOptions:
     altitude: Annotated[
         str, Option(metavar='START:END', help='Metres, linear over the file; for videos.')
     ] = DEFAULT_ALTITUDE
+    ground_m: Annotated[
+        float,
+        Option(
+            '--ground',
+            metavar='M',
+            help='z of the ground in the poses of a bag, where they do not count from there but '
+            'from sea level or the place of arming.',
+        ),
+    ] = 0.0
     every: Annotated[int, Option(metavar='N', help='Take every N-th frame.')] = 1
     hz: Annotated[
         float | None, Option(metavar='HZ', help='Take at most HZ frames per recorded second.')
@@ -98,6 +107,8 @@ class SourceOptions:
     def __post_init__(self) -> None:
         if self.every < 1:
             raise RecordingError(f'--every {self.every}: give 1 or more')
+        if not isfinite(self.ground_m):
+            raise RecordingError(f'--ground {self.ground_m}: give the metres of z at the ground')
         if self.hz is not None and not 0.0 < self.hz <= 1000.0:
             raise RecordingError(f'--hz {self.hz}: give more than 0 and at most 1000')
         if self.limit is not None and self.limit < 1:
@@ -150,6 +161,8 @@ class RecordingSource(Protocol):
     """In the order of their stamps."""
     engage_ns: int | None
     """When the recorded landing began; None engages with the first frame."""
+    remarks: list[str]
+    """What the user has to know of the recording, such as what was left out of it."""
 
     def frames(self) -> Iterator[Taken]:
         """Yield the chosen frames in the order of their stamps."""
@@ -197,6 +210,9 @@ class VideoSource:
         self.count = _Picker(options).about(self._reader.count)
         self.poses = [self._reader.pose(index) for index in range(self._reader.count)]
         self.engage_ns: int | None = None
+        self.remarks = [
+            f'no altitude was recorded: {options.altitude} m is assumed, linear (--altitude)'
+        ]
         self.frame_hz = self._reader.frame_hz / options.every
 
     def frames(self) -> Iterator[Taken]:
@@ -227,24 +243,29 @@ class BagSource:
                 raise RecordingError(
                     f'topic {self.image_topic} of bag {path} has 0 messages: choose another'
                 )
-            self.poses = _poses(bag, self.pose_topic)
-            frame_id = _first(bag, self.image_topic).header.frame_id
-            self._info_topic = _info_topic(bag, self.image_topic, frame_id, options)
-            self._first_info = None if self._info_topic is None else _first(bag, self._info_topic)
-            self.mount = options.mount or _recorded_mount(bag, frame_id)
+            self.remarks = list(bag.remarks)
+            self.poses = [
+                replace(pose, altitude_agl_m=pose.altitude_agl_m - options.ground_m)
+                for pose in _poses(bag, self.pose_topic, self.remarks)
+            ]
+            self._unstamped = _unstamped(bag, self.image_topic, self.poses, self.remarks)
+            self._calibration = RecordedCalibration(
+                bag, self.image_topic, is_wanted=options.fov_x_deg is None, remarks=self.remarks
+            )
+            self.mount = options.mount or self._calibration.mount
             self.engage_ns = _engaged_ns(bag)
 
     def frames(self) -> Iterator[Taken]:
         """Yield the chosen frames; those that cannot be decoded with their fault."""
         picker = _Picker(self.options)
-        last_ns, info = -1, self._first_info
-        topics = [self.image_topic, *([] if self._info_topic is None else [self._info_topic])]
+        last_ns, info = -1, self._calibration.first
+        topics = [self.image_topic, *self._calibration.topics]
         with BagReader(self.path) as bag:
-            for topic, _, message in bag.messages(topics):
-                if topic == self._info_topic:
+            for topic, receipt_ns, message in bag.messages(topics):
+                if topic != self.image_topic:
                     info = message
                     continue
-                stamp_ns = stamp_ns_of(message)
+                stamp_ns = receipt_ns if self._unstamped else stamp_ns_of(message)
                 if not picker.takes(stamp_ns):
                     continue
                 if stamp_ns <= last_ns:
@@ -254,7 +275,8 @@ class BagSource:
                 last_ns = stamp_ns
                 try:
                     rectified = is_rectified(self.image_topic)
-                    yield Taken(stamp_ns, frame_from_message(message, info, rectified=rectified))
+                    frame = frame_from_message(message, info, rectified=rectified)
+                    yield Taken(stamp_ns, replace(frame, stamp_ns=stamp_ns))
                 except PeaceError as error:
                     yield Taken(stamp_ns, None, str(error))
                 if picker.is_done:
@@ -271,10 +293,10 @@ def open_source(path: Path, options: SourceOptions) -> RecordingSource:
         raise RecordingError(f'{path} does not exist: give a bag or a video file')
     if path.suffix.lower() in VIDEO_SUFFIXES:
         return VideoSource(path, options)
-    if path.is_dir() or path.suffix in {'.mcap', '.db3'}:
+    if is_recording(path):
         return BagSource(path, options)
     raise RecordingError(
-        f'{path} is neither a bag (folder, .mcap, .db3) nor a video '
+        f'{path} is neither a bag (folder, {", ".join(STORAGES)}) nor a video '
         f'({", ".join(VIDEO_SUFFIXES)}): give one of those'
     )
 
@@ -288,6 +310,10 @@ def _choose(
 ) -> str:
     if given is not None:
         bag.require(given, types)
+        if not bag.count(given):
+            raise RecordingError(
+                f'topic {given} of bag {bag.path} has 0 messages: choose another with {option}'
+            )
         return given
     found = [topic for topic in bag.find(types) if bag.count(topic)]
     for name in preferred:
@@ -299,66 +325,52 @@ def _choose(
     raise RecordingError(f'bag {bag.path}: {option} is not clear, there is {listed}: name one')
 
 
-def _poses(bag: BagReader, topic: str) -> list[Pose]:
-    try:
-        poses = [pose_from_message(message) for _, _, message in bag.messages([topic])]
-    except VehicleError as error:
-        raise RecordingError(f'bag {bag.path}: {error}') from error
+def _poses(bag: BagReader, topic: str, remarks: list[str]) -> list[Pose]:
+    """Return the poses in the order of their stamps; remark on those that cannot be used."""
+    poses: list[Pose] = []
+    faults: list[str] = []
+    for _, _, message in bag.messages([topic]):
+        try:
+            poses.append(pose_from_message(message))
+        except VehicleError as error:  # noqa: PERF203 (one bad pose among many)
+            faults.append(str(error))
+    if not poses:
+        raise RecordingError(
+            f'bag {bag.path}: none of {len(faults)} messages of {topic} is a pose; the first: '
+            f'{faults[0] if faults else "there is none"}: choose another with --pose-topic'
+        )
+    if faults:
+        remarks.append(f'{len(faults)} poses of {topic} left out; the first: {faults[0]}')
     poses.sort(key=lambda pose: pose.stamp_ns)
     return [
-        pose
-        for before, pose in zip([None, *poses[:-1]], poses, strict=True)
-        if before is None or pose.stamp_ns > before.stamp_ns
+        poses[0],
+        *(pose for before, pose in pairwise(poses) if pose.stamp_ns > before.stamp_ns),
     ]
 
 
-def _first(bag: BagReader, topic: str) -> Any:
-    for _, _, message in bag.messages([topic]):
-        return message
-    raise RecordingError(f'topic {topic} of bag {bag.path} has 0 messages: choose another')
-
-
-def _info_topic(
-    bag: BagReader, image_topic: str, frame_id: str, options: SourceOptions
-) -> str | None:
-    """Return the topic of the calibration of the images, None where there is none to be used.
+def _unstamped(bag: BagReader, topic: str, poses: list[Pose], remarks: list[str]) -> bool:
+    """Tell whether the images have no stamps, so that those of their receipt have to serve.
 
     Raises:
-        RecordingError: it holds no calibration, or there are only those of other cameras.
+        RecordingError: images and poses are of different clocks.
     """
-    if options.fov_x_deg is not None:
-        return None
-    found = [topic for topic in bag.find([_CAMERA_INFO]) if bag.count(topic)]
-    own = camera_info_topic(image_topic)
-    if own not in found:
-        same = [each for each in found if _first(bag, each).header.frame_id == frame_id]
-        if len(same) != 1:
-            if not found:
-                return None
-            raise RecordingError(
-                f'bag {bag.path}: none of {", ".join(found)} is beside {image_topic}, and '
-                f'{len(same)} of them have its frame_id {frame_id!r}: give --fov'
-            )
-        own = same[0]
-    info = _first(bag, own)
-    focal_px = float((info.p if is_rectified(image_topic) else info.k)[0])
-    if not focal_px > 0.0:
+    first = next(iter(bag.messages([topic])), None)
+    if first is None:
+        return False
+    _, receipt_ns, message = first
+    unstamped = stamp_ns_of(message) == 0
+    if unstamped:
+        remarks.append(f'images of {topic} have the stamp 0: the time of their receipt is used')
+    stamp_ns = receipt_ns if unstamped else stamp_ns_of(message)
+    begin_ns, end_ns = poses[0].stamp_ns, poses[-1].stamp_ns
+    apart_s = max(begin_ns - stamp_ns, stamp_ns - end_ns) * 1e-9
+    if apart_s > _CLOCKS_APART_S:
         raise RecordingError(
-            f'{own} of bag {bag.path} with focal length {focal_px} px is not calibrated: give --fov'
+            f'bag {bag.path}: poses are stamped {begin_ns * 1e-9:.1f} to {end_ns * 1e-9:.1f} s, '
+            f'the first image {stamp_ns * 1e-9:.1f} s, which never meet: record both with one '
+            'clock (synchronise the autopilot, or let the driver stamp in ROS time)'
         )
-    return own
-
-
-def _recorded_mount(bag: BagReader, frame_id: str) -> Mount:
-    """Return the mount by /tf_static, nadir where it says nothing of the camera."""
-    transforms = StaticTransforms()
-    if bag.topics.get(_TF_STATIC) == 'tf2_msgs/msg/TFMessage':
-        for _, _, message in bag.messages([_TF_STATIC]):
-            transforms.add(message)
-    try:
-        return transforms.mount(_VEHICLE_FRAME, frame_id)
-    except ConfigurationError:
-        return NADIR
+    return unstamped
 
 
 def _engaged_ns(bag: BagReader) -> int | None:
