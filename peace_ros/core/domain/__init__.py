@@ -13,7 +13,7 @@ from peace_ros.core.domain.errors import (
     WorldError,
 )
 from peace_ros.core.domain.labels import SAFE_LABELS, Label, is_safe
-from peace_ros.core.domain.motion import Pose, Setpoint, Site, Telemetry
+from peace_ros.core.domain.motion import HeightReport, Pose, Setpoint, Site, Telemetry
 from peace_ros.core.domain.perception import DepthImage, Frame, Heatmap, Prompt, RankedWord
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     'Distortion',
     'Frame',
     'Heatmap',
+    'HeightReport',
     'ImageError',
     'Label',
     'Mount',

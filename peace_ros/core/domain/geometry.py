@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from peace_ros.core.domain.camera import NADIR, Camera, Mount, Quaternion
 from peace_ros.core.domain.motion import Pose
 
+GRAVITY_M_S2 = 9.80665
+
 _SQRT_HALF = 0.5**0.5
 _NED_TO_ENU: Quaternion = (0.0, _SQRT_HALF, _SQRT_HALF, 0.0)
 """Half a turn about the north-east diagonal; its own inverse."""
@@ -85,6 +87,17 @@ def rotation_matrix(q: Quaternion) -> NDArray[np.float64]:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def lean_acceleration(q: Quaternion) -> tuple[float, float]:
+    """Return the horizontal acceleration (north, east, m/s^2) that the lean of a multicopter gives.
+
+    Its thrust carries its weight; a lean of more than 84 degrees counts as that.
+    """
+    w, x, y, z = q
+    upright = max(0.1, 1.0 - 2.0 * (x * x + y * y))
+    scale = -2.0 * GRAVITY_M_S2 / upright
+    return scale * (x * z + w * y), scale * (y * z - w * x)
 
 
 def angle_between(a: Quaternion, b: Quaternion) -> float:

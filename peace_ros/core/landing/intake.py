@@ -12,12 +12,13 @@ from collections import Counter, deque
 
 import numpy as np
 
-from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, ImageError, Mount, Pose
+from peace_ros.core.domain import NADIR, Camera, DepthImage, Frame, Heatmap, ImageError, Mount, Pose
 from peace_ros.core.domain.geometry import camera_pose
 from peace_ros.core.domain.motion import FARTHEST_M
 from peace_ros.core.landing.calibration import Calibration, has_shape
 from peace_ros.core.landing.odometry import PositionCarrier
 from peace_ros.core.landing.parameters import LandingParameters
+from peace_ros.core.landing.picture_height import PictureHeight
 from peace_ros.core.landing.picture_watch import PictureWatch
 from peace_ros.core.landing.poses import Miss, PoseHistory, jump_m
 from peace_ros.core.mapping import RefusedLookError, SafetyMap
@@ -37,7 +38,7 @@ class HeatmapIntake:
         parameters: LandingParameters,
         camera: Camera,
         safety_map: SafetyMap,
-        mount: Mount | None,
+        mount: Mount | None = NADIR,
     ) -> None:
         self._p = parameters
         self._calibration = Calibration(camera)
@@ -58,6 +59,11 @@ class HeatmapIntake:
         self._last_rejection = self._drop_reason = ''
         self.drops = 0
         """How often the map was dropped; a site chosen from it is no longer valid then."""
+
+    @property
+    def picture_height(self) -> PictureHeight:
+        """The height by the scale of the pictures."""
+        return self._carrier.height
 
     @property
     def last_rejection(self) -> str:
@@ -102,8 +108,8 @@ class HeatmapIntake:
 
     def add_view(self, frame: Frame) -> None:
         """Keep the picture of a frame, from which the position is estimated when it is unknown."""
-        if frame.size_px != (self._camera.width_px, self._camera.height_px):
-            self.counts['picture of another size than the camera'] += 1
+        if not has_shape(self._camera, *frame.size_px):
+            self.counts['picture of another shape than the frames'] += 1
         elif self._carrier.add_view(frame):
             self._settle()
 

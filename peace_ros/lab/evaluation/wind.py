@@ -15,7 +15,7 @@ import json
 import sys
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import cos, hypot, inf, pi, sin
 from pathlib import Path
 from time import monotonic
@@ -28,6 +28,7 @@ from peace_ros.core.domain import (
     NADIR,
     Camera,
     Heatmap,
+    HeightReport,
     Label,
     Mount,
     Pose,
@@ -38,7 +39,11 @@ from peace_ros.core.domain import (
 )
 from peace_ros.core.landing import Decision, LandingCore, LandingParameters, State
 from peace_ros.core.mapping import MapParameters
-from peace_ros.simulation.autopilot.estimate_errors import PX4_ERRORS, EstimateErrors
+from peace_ros.simulation.autopilot.estimate_errors import (
+    PX4_ERRORS,
+    EstimateErrors,
+    GnssAltitudeError,
+)
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import Mode
@@ -119,6 +124,8 @@ class WindFlight:
         px4_errors: Above 0: fly as PX4, with so many times its measured errors.
         camera: What looks down, with its lens; None: a small square pinhole.
         mount: How it is mounted.
+        start_m: Height at which the flight begins.
+        gnss_noise_m: Standard deviation of the GNSS altitude.
     """
 
     def __init__(
@@ -130,6 +137,8 @@ class WindFlight:
         px4_errors: float = 0.0,
         camera: Camera | None = None,
         mount: Mount = NADIR,
+        start_m: float = START_M,
+        gnss_noise_m: float = 0.0,
     ) -> None:
         self._random = np.random.default_rng(seed)
         self._seed, self._heatmap_s = seed, 1.0 / heatmap_hz
@@ -138,10 +147,11 @@ class WindFlight:
         physics = Physics(wind_to_m_s=wind, gust_m_s=gust_m_s, seed=seed)
         kind = Kind.PX4 if px4_errors > 0.0 else Kind.ARDUPILOT
         errors = EstimateErrors(PX4_ERRORS.times(px4_errors), seed)
-        self._flight = flying(physics, Personality(kind), errors)
+        gnss = GnssAltitudeError(gnss_noise_m, seed)
+        self._flight = flying(physics, Personality(kind), errors, gnss, start_m)
         square = Camera.from_degrees(_PIXELS, _PIXELS, 73)
         self._camera = camera
-        self._eye = self._seeing(square if camera is None else camera, mount)
+        self._over_ground = self._seeing(square if camera is None else camera, mount)
         # What the frames are comes with them; the parameters of the landing describe the square.
         self._core = LandingCore(
             LandingParameters(), square, MapParameters(map_size_m=160.0), mount
@@ -152,7 +162,7 @@ class WindFlight:
         self._telemetry = Telemetry(received_ns=0)
         self._told_s = self._now_s
         self._due_s = dict.fromkeys(('pose', 'heatmap', 'step'), self._now_s)
-        self._lowest_m = START_M
+        self._lowest_m = start_m
         self.track: list[tuple[float, float, float, Decision]] = []
         """Time, true north and east, and the decision of each step."""
         self.clearances_m = (0.0, 0.0)
@@ -183,7 +193,7 @@ class WindFlight:
         over_s, at = self._now_s, len(self.track) - 1
         site = self.track[at][3].site
         physics = self._flight.physics
-        true_m = self._eye.clearance_m(physics.north_m, physics.east_m)
+        true_m = self._over_ground.clearance_m(physics.north_m, physics.east_m)
         self.clearances_m = (0.0 if site is None else site.clearance_m, true_m or 0.0)
         while self._now_s < over_s + _AFTER_S:
             self._tick()
@@ -220,14 +230,22 @@ class WindFlight:
         q = self._flight.physics.quaternion_ned_frd
         return Pose(round(self._now_s * 1e9), north, east, down, q, -down)
 
+    def _seen_from(self) -> Pose:
+        """Return the pose of now with the true height."""
+        return replace(self._pose(), altitude_agl_m=-self._flight.physics.down_m)
+
+    def _heights(self) -> tuple[HeightReport, ...]:
+        """Return what other sources than the barometer report now."""
+        return ()
+
     def _report(self) -> None:
         velocity = self._flight.velocity_m_s
         self._poses.append((self._now_s + _LINE_DELAY_S, self._pose(), velocity))
 
     def _look(self) -> None:
-        pose = self._pose()
+        pose = self._seen_from()
         size = (_PIXELS, _PIXELS)
-        labels = self._eye.view(pose).labels
+        labels = self._over_ground.view(pose).labels
         safe = np.where(labels == Label.GRASS, np.float32(_SAFE), np.float32(_UNSAFE))
         true = cv2.resize(safe, size, interpolation=cv2.INTER_AREA)
         noise = cv2.GaussianBlur(self._random.standard_normal(size), (0, 0), _NOISE_PX)
@@ -243,7 +261,16 @@ class WindFlight:
             self._core.add_pose(pose)
             self._told_s = self._now_s
             self._telemetry = Telemetry(
-                1, pose, *velocity, armed=True, in_control=True, mode='GUIDED', landed=False
+                received_ns=1,
+                pose=pose,
+                v_north_m_s=velocity[0],
+                v_east_m_s=velocity[1],
+                v_down_m_s=velocity[2],
+                armed=True,
+                in_control=True,
+                mode='GUIDED',
+                landed=False,
+                heights=self._heights(),
             )
         while self._heatmaps and self._heatmaps[0][0] <= self._now_s:
             self._core.add_heatmap(self._heatmaps.popleft()[1])
@@ -295,7 +322,11 @@ def to_and_fro_m(places_m: NDArray[np.float64]) -> float:
 
 
 def flying(
-    physics: Physics, personality: Personality | None = None, errors: EstimateErrors | None = None
+    physics: Physics,
+    personality: Personality | None = None,
+    errors: EstimateErrors | None = None,
+    gnss: GnssAltitudeError | None = None,
+    start_m: float = START_M,
 ) -> Flight:
     """Return an autopilot that has hovered in this wind for a while, in GUIDED or OFFBOARD.
 
@@ -303,11 +334,13 @@ def flying(
         physics: Of the vehicle, at rest on the ground.
         personality: Which autopilot; None: ArduPilot.
         errors: Of its estimates; None: none.
+        gnss: Error of the GNSS altitude; None: none.
+        start_m: Height at which it hovers.
 
     Raises:
         VehicleError: it does not come into the air.
     """
-    flight = Flight(physics, personality, errors=errors)
+    flight = Flight(physics, personality, errors=errors, gnss=gnss)
     while not flight.has_position:
         flight.step(_TICK_S)
     flight.set_mode(Mode.STABILIZE if flight.personality.is_px4 else Mode.GUIDED)
@@ -319,7 +352,7 @@ def flying(
             raise VehicleError(f'the simulated vehicle did not take off within {_BOOT_S:g} s')
         flight.step(_TICK_S)
     physics.north_m = physics.east_m = 0.0
-    physics.down_m = -START_M
+    physics.down_m = -start_m
     for mode in (Mode.BRAKE, Mode.GUIDED):
         flight.take_velocity(_target(Setpoint(0)))
         flight.set_mode(mode)

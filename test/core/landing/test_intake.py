@@ -35,7 +35,7 @@ def safety_map():
 @pytest.fixture
 def intake(safety_map):
     """An intake with poses at 10 Hz and a heatmap on each, up to the second second."""
-    intake = HeatmapIntake(LandingParameters(), CAMERA, safety_map, NADIR)
+    intake = HeatmapIntake(LandingParameters(), CAMERA, safety_map)
     for tick in range(1, 21):
         intake.add_pose(pose_of(0.1 * tick))
         intake.add_heatmap(heatmap_of(0.1 * tick))
@@ -289,5 +289,5 @@ def test_another_mount_drops_the_map(intake, safety_map):
 def test_pictures_and_depth_of_another_shape_are_counted_and_not_used(intake):
     intake.add_view(Frame(np.full((36, 64, 3), 9, np.uint8), round(2.0 * S)))
     intake.add_depth(DepthImage(np.full((36, 64), 9.0, np.float32), round(2.0 * S)))
-    assert intake.counts['picture of another size than the camera'] == 1
+    assert intake.counts['picture of another shape than the frames'] == 1
     assert intake.counts['depth of another shape than the frames'] == 1
