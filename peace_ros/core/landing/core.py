@@ -10,11 +10,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from peace_ros.core.domain import (
+    NADIR,
     Camera,
     DepthImage,
     Frame,
     Heatmap,
     HeightReport,
+    Mount,
     Pose,
     Telemetry,
 )
@@ -47,10 +49,19 @@ class LandingCore:
         parameters: LandingParameters,
         camera: Camera,
         map_parameters: MapParameters | None = None,
+        mount: Mount | None = NADIR,
     ) -> None:
+        """Begin in IDLE.
+
+        Args:
+            parameters: Of the landing.
+            camera: For frames that come without a calibration of their own.
+            map_parameters: Of the map.
+            mount: How the camera sits on the vehicle; None until :meth:`place_camera` says it.
+        """
         self.parameters = parameters
         self.safety_map = SafetyMap(map_parameters)
-        self._intake = HeatmapIntake(parameters, camera, self.safety_map)
+        self._intake = HeatmapIntake(parameters, camera, self.safety_map, mount)
         self._lookout = Lookout(parameters, self.safety_map)
         self._heights = HeightWatch(parameters)
         self._helm = Helm(parameters)
@@ -62,6 +73,15 @@ class LandingCore:
         """The state that the last step ended in."""
         return self._helm.state
 
+    @property
+    def last_rejection(self) -> str:
+        """Why the newest heatmap did not reach the map, or why the map was dropped."""
+        return self._intake.last_rejection
+
+    def place_camera(self, mount: Mount) -> None:
+        """Set how the camera sits on the vehicle; no heatmap is used before that is known."""
+        self._intake.place_camera(mount)
+
     def add_pose(self, pose: Pose) -> None:
         """Keep a pose for the heatmaps around its stamp; in the order of stamps."""
         self._intake.add_pose(pose)
@@ -69,6 +89,10 @@ class LandingCore:
     def add_heatmap(self, heatmap: Heatmap) -> None:
         """Put a heatmap into the map with the pose at its stamp, or count the reason why not."""
         self._intake.add_heatmap(heatmap)
+
+    def reject_heatmap(self, reason: str) -> None:
+        """Count a heatmap that cannot be used, and remember why."""
+        self._intake.reject(reason)
 
     def add_depth(self, depth: DepthImage) -> None:
         """Close ground that a depth image shows not flat; optional, and it opens nothing."""

@@ -123,6 +123,12 @@ class PositionCarrier:
         self.height.begin()
         self.forget_way()
 
+    def change_camera(self, camera: Camera) -> None:
+        """Use another camera; the estimate begins again."""
+        self._odometry = VisualOdometry(camera)
+        self.height.change_camera(camera)
+        self.forget_way()
+
     def forget_way(self) -> None:
         """Forget the estimate; it starts again from the next known position."""
         self._pending.clear()

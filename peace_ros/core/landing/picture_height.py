@@ -43,6 +43,11 @@ class PictureHeight:
         self.above_reported_m = 0.0
         """Height by the pictures minus the reported altitude, at that stamp."""
 
+    def change_camera(self, camera: Camera) -> None:
+        """Use another camera, and begin again."""
+        self._camera = camera
+        self.begin()
+
     def begin(self) -> None:
         """Begin with the altitude of the next picture."""
         self._taken_ns = self._key = self._last = self.stamp_ns = None

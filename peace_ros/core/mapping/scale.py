@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import Camera, Pose
-from peace_ros.core.domain.geometry import image_to_ground
+from peace_ros.core.domain.geometry import ground_to_camera
 from peace_ros.core.mapping.registration import Mismatch, View
+from peace_ros.core.optics import pixels, rays
 
 _CORNERS = 120
 _CORNER_QUALITY = 0.01
@@ -65,12 +66,13 @@ def height_change(before: View, after: View, camera: Camera) -> HeightChange | M
     corners = cv2.goodFeaturesToTrack(before.grey, _CORNERS, _CORNER_QUALITY, _CORNER_DISTANCE_PX)
     if corners is None or len(corners) < _FEWEST:
         return Mismatch.TEXTURE
-    ground_from = [image_to_ground(*_one_above(view, camera)) for view in (before, after)]
-    guess = _projected(corners, np.linalg.inv(ground_from[1]) @ ground_from[0])
+    seen_from = [_one_above(view, camera) for view in (before, after)]
+    begin = _on_ground(corners, *seen_from[0])
+    guess = None if begin is None else _in_picture(begin, *seen_from[1])
     if guess is None:
         return Mismatch.HORIZON
     seen = _followed(before.grey, after.grey, corners, guess.reshape(-1, 1, 2))
-    there, here = (_projected(*each) for each in zip(seen, ground_from, strict=True))
+    there, here = (_on_ground(points, *by) for points, by in zip(seen, seen_from, strict=True))
     if there is None or here is None:
         return Mismatch.HORIZON
     return _fitted(there, here, _OFF_PX / _one_above(before, camera)[0].focal_px)
@@ -83,12 +85,23 @@ def _one_above(view: View, camera: Camera) -> tuple[Camera, Pose]:
     return camera.resized(width, height), pose
 
 
-def _projected(points: Points, matrix: NDArray[np.float64]) -> Points | None:
-    """Return points after a homography; None when one of them lies above the horizon."""
-    lifted = np.column_stack([points.reshape(-1, 2), np.ones(len(points))]) @ matrix.T
-    if not (lifted[:, 2] > 0.0).all():
+def _on_ground(points: Points, camera: Camera, pose: Pose) -> Points | None:
+    """Return pixels (u, v) as ground (north, east); None when one is above the horizon."""
+    directions = rays(camera, *points.reshape(-1, 2).T)
+    ground = np.linalg.inv(ground_to_camera(camera, pose)) @ directions
+    # A comparison with NaN is false, so pixels without a direction are refused too.
+    if not (ground[2] > 0.0).all():
         return None
-    return np.asarray(lifted[:, :2] / lifted[:, 2:], np.float32)
+    return np.ascontiguousarray((ground[:2] / ground[2]).T, np.float32)
+
+
+def _in_picture(ground: Points, camera: Camera, pose: Pose) -> Points | None:
+    """Return ground (north, east) as pixels (u, v); None when one is not in front of the camera."""
+    directions = ground_to_camera(camera, pose) @ np.vstack((ground.T, np.ones(len(ground))))
+    if not (directions[2] > 0.0).all():
+        return None
+    seen = pixels(camera, directions)
+    return np.ascontiguousarray(seen.T, np.float32) if np.isfinite(seen).all() else None
 
 
 def _followed(
