@@ -9,12 +9,13 @@ policy gets the same ones, however many workers there are.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, tan
+from math import pi, radians, tan
 from pathlib import Path
 
 import numpy as np
 
 from peace_ros.core.domain import Camera, ConfigurationError, WorldError
+from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.simulation.camera import NadirCamera
 from peace_ros.simulation.drawing import CONDITIONS
 from peace_ros.simulation.drawing.town import MIXED, check_town
@@ -110,7 +111,7 @@ def draw_start(place: Place, seed: int, run: int, world: World | None = None) ->
     heading_rad = float(draw.uniform(-pi, pi))
     reach_m = np.array([_DRAWN_WITHIN_M, _DRAWN_WITHIN_M])
     if place.world != DRAWN and world is not None:
-        seen_m = START_ALTITUDE_M * tan(Camera.from_degrees(1, 1, 73.0).fov_x_rad / 2.0)
+        seen_m = START_ALTITUDE_M * tan(radians(CameraOptions().camera_fov) / 2.0)
         reach_m = np.maximum(np.array(world.size_m) / 2.0 - seen_m, 0.15 * np.array(world.size_m))
     return Start(
         run=run,

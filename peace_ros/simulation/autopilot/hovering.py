@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from peace_ros.core.domain import Setpoint, VehicleError
-from peace_ros.simulation.autopilot.estimate_errors import EstimateErrors
+from peace_ros.simulation.autopilot.estimate_errors import EstimateErrors, GnssAltitudeError
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import Mode
@@ -24,6 +24,7 @@ def hovering(
     altitude_m: float,
     personality: Personality | None = None,
     errors: EstimateErrors | None = None,
+    gnss: GnssAltitudeError | None = None,
 ) -> Flight:
     """Return an autopilot that has hovered in this wind for a while, in GUIDED or OFFBOARD.
 
@@ -32,11 +33,12 @@ def hovering(
         altitude_m: Where it hovers, in metres above the ground.
         personality: Which autopilot; None: ArduPilot.
         errors: Of its estimates; None: none.
+        gnss: Error of the GNSS altitude; None: none.
 
     Raises:
         VehicleError: It does not come into the air.
     """
-    flight = Flight(physics, personality, errors=errors)
+    flight = Flight(physics, personality, errors=errors, gnss=gnss)
     while not flight.has_position:
         flight.step(_TICK_S)
     flight.set_mode(Mode.STABILIZE if flight.personality.is_px4 else Mode.GUIDED)
