@@ -36,8 +36,6 @@ OLDEST_S = 1.0
 AHEAD_S = 0.1
 ASPECT_TOLERANCE = 0.01
 """As the segmentation allows it from frame to frame."""
-FOV_TOLERANCE_DEG = 1.0
-"""1.2 m at the edge of the image from 100 m."""
 
 
 @dataclass
@@ -250,14 +248,14 @@ def _judge_geometry(
                 'calibrate the camera at the size at which it is used',
             )
             return
+        # The nodes project with the calibration; the parameters do not matter then.
         yield fine(found, hfov_deg=round(hfov_deg, 2))
-    else:
-        hfov_deg = options.camera_fov
-        yield fine(f'no calibration on {heard.info_topic}: the parameters count')
-    yield from _compare(options, (width, height), hfov_deg)
+        return
+    yield fine(f'no calibration on {heard.info_topic}: the parameters count')
+    yield from _compare(options, (width, height))
 
 
-def _compare(options: CameraOptions, size_px: Sequence[int], hfov_deg: float) -> Findings:
+def _compare(options: CameraOptions, size_px: Sequence[int]) -> Findings:
     width, height = size_px
     told = f'camera_width {options.camera_width}, camera_height {options.camera_height}'
     if not _same_aspect(width / height, options.camera_width / options.camera_height):
@@ -265,12 +263,6 @@ def _compare(options: CameraOptions, size_px: Sequence[int], hfov_deg: float) ->
             f'the images are {width} x {height} px, the parameters of the landing node say {told}: '
             'the ground would be stretched',
             f'set camera_width: {width} and camera_height: {height} of the landing node',
-        )
-    elif abs(options.camera_fov - hfov_deg) > FOV_TOLERANCE_DEG:
-        yield mend(
-            f'the camera sees {hfov_deg:.1f} degrees, the parameter camera_fov of the landing node '
-            f'says {options.camera_fov:.1f}',
-            f'set camera_fov: {hfov_deg:.1f} of the landing node',
         )
     else:
         yield fine(
