@@ -62,7 +62,7 @@ def defaults_yaml() -> str:
     """Return config/defaults.yaml: a ROS parameter file with a comment before each value."""
     parts = [_LICENCE]
     for node, groups in NODE_PARAMETERS.items():
-        parts.append(f'\n{node}:\n  ros__parameters:\n')
+        parts.append(f'\n/**/{node}:\n  ros__parameters:\n')
         section = ''
         for group, parameters in groups:
             if group != section:

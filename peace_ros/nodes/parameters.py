@@ -17,6 +17,7 @@ from typing import TypeVar
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
+from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.domain.parameters import ParameterInfo, describe
 from peace_ros.core.node_parameters import (
     Group,
@@ -27,7 +28,7 @@ from peace_ros.core.node_parameters import (
     ros_name,
     unknown_name,
 )
-from peace_ros.core.yaml_files import WILDCARDS, read_sections
+from peace_ros.core.yaml_files import WILDCARDS, addresses, read_sections
 
 _Parameters = TypeVar('_Parameters')
 
@@ -80,6 +81,29 @@ def refuse_unknown(node: Node, *groups: Group) -> None:
             raise unknown_name(name, node.get_name(), known)
         refuse_misspelt(name, foreign[name], known)
         node.get_logger().info(f'parameter {name} of section {foreign[name]} is left to others')
+
+
+def refuse_files_for_others(node: Node, kind: str) -> None:
+    """Refuse a parameter file that is for this kind of node and, by its sections, not for this one.
+
+    ROS would ignore it without a word, and the defaults would fly.
+
+    Args:
+        node: with its namespace, and the name that it runs under.
+        kind: its name where nobody renames it.
+
+    Raises:
+        ConfigurationError: there is such a file.
+    """
+    name = node.get_fully_qualified_name()
+    for option, path in pairwise(sys.argv):
+        sections = read_sections(Path(path)) if option == _FILE else ()
+        meant = [each for each in sections if each.rpartition('/')[2] == kind]
+        if meant and not any(addresses(each, name) for each in sections if each not in WILDCARDS):
+            raise ConfigurationError(
+                f'{path}: section {meant[0]} is not for node {name}, and would be ignored: name '
+                f'the section /**/{node.get_name()}'
+            )
 
 
 def _only_in_wildcards(arguments: list[str], node: str) -> dict[str, str]:

@@ -22,7 +22,11 @@ from rclpy.signals import SignalHandlerOptions
 from peace_ros.core.domain import ConfigurationError, PeaceError
 from peace_ros.core.node_parameters import Group
 from peace_ros.nodes.failure import EXIT_FAILED, Failure
-from peace_ros.nodes.parameters import declare_parameters, refuse_unknown
+from peace_ros.nodes.parameters import (
+    declare_parameters,
+    refuse_files_for_others,
+    refuse_unknown,
+)
 from peace_ros.nodes.spinning import spin_until_ended
 
 _Parameters = TypeVar('_Parameters')
@@ -41,11 +45,13 @@ class PeaceNode(Node):  # type: ignore[misc]
         """Create the node; refuse parameters that none of the dataclasses declares.
 
         Raises:
-            ConfigurationError: a parameter of another type, outside its bounds or unknown.
+            ConfigurationError: a parameter of another type, outside its bounds or unknown, or a
+                parameter file for nodes of other names or namespaces.
 
         """
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **options)
         try:
+            refuse_files_for_others(self, name)
             refuse_unknown(self, *groups)
             self._filled = {each: declare_parameters(self, each, group) for group, each in groups}
         except PeaceError:

@@ -96,14 +96,54 @@ def test_a_bad_value_is_refused_in_one_sentence(values, words):
 def node_from(tmp_path, monkeypatch):
     """Start a node with a parameter file."""
 
-    def start(text: str) -> PeaceNode:
+    def start(text: str, *remaps: str) -> PeaceNode:
         path = tmp_path / 'given.yaml'
         path.write_text(text)
         arguments = ['--ros-args', '--params-file', str(path)]
+        arguments += [each for remap in remaps for each in ('-r', remap)]
         monkeypatch.setattr('sys.argv', ['sample', *arguments])
         return PeaceNode('sample', ('', Sample), cli_args=arguments)
 
     return start
+
+
+IN_DRONE, RENAMED = '__ns:=/drone', '__node:=other'
+
+
+@pytest.mark.parametrize(
+    ('section', 'remaps'),
+    [
+        ('sample', []),
+        ('/sample', []),
+        ('/**/sample', []),
+        ('/**/sample', [IN_DRONE]),
+        ('/*/sample', [IN_DRONE]),
+        ('/**/sample', ['__ns:=/fleet/drone']),
+        ('/drone/sample', [IN_DRONE]),
+        ('/**/other', [RENAMED]),
+        ('/**', [IN_DRONE, RENAMED]),
+    ],
+)
+def test_a_section_reaches_the_node_that_ros_says_it_is_for(node_from, section, remaps):
+    node = node_from(f'{section}:\n  ros__parameters: {{count: 7}}\n', *remaps)
+    assert node.filled(Sample).count == 7
+    node.destroy_node()
+
+
+@pytest.mark.parametrize(
+    ('section', 'remaps', 'remedy'),
+    [
+        ('sample', [IN_DRONE], '/**/sample'),
+        ('/sample', [IN_DRONE], '/**/sample'),
+        ('/*/sample', [], '/**/sample'),
+        ('/swarm/sample', [IN_DRONE], '/**/sample'),
+        ('/**/sample', [RENAMED], '/**/other'),
+    ],
+)
+def test_a_file_that_ros_would_ignore_is_refused(node_from, section, remaps, remedy):
+    with pytest.raises(ConfigurationError, match='would be ignored') as caught:
+        node_from(f'{section}:\n  ros__parameters: {{count: 7}}\n', *remaps)
+    assert str(caught.value).endswith(f'name the section {remedy}')
 
 
 WILDCARD = '/**:\n  ros__parameters:\n    count: 7\n'
@@ -153,7 +193,7 @@ def test_code_yaml_and_documentation_agree(node):
         name: list(value) if isinstance(value, tuple) else value for name, value in defaults.items()
     }
     shipped = yaml.safe_load((ROOT / 'config' / 'defaults.yaml').read_text())
-    written = flat(shipped[node]['ros__parameters'])
+    written = flat(shipped[f'/**/{node}']['ros__parameters'])
     assert written == plain
     assert {name: type(value) for name, value in written.items()} == {
         name: type(value) for name, value in plain.items()
@@ -190,11 +230,12 @@ def test_presets_are_the_six_of_the_paper_and_their_values_exist():
         f'{prompt}_{model}' for prompt in ('dd', 'd', 'peace') for model in ('cs', 'fs')
     }
     for path in PRESETS.glob('*.yaml'):
-        for node, section in yaml.safe_load(path.read_text()).items():
+        for wildcard, section in yaml.safe_load(path.read_text()).items():
+            node = wildcard.removeprefix('/**/')
             known = named(NODE_PARAMETERS[node])
             for name, value in section['ros__parameters'].items():
                 assert type(value) is type(known[name].default), f'{path.name}: {node}.{name}'
             prompt, model = path.stem.split('_')
             assert section['ros__parameters']['template'] == prompt.upper()
-        family = yaml.safe_load(path.read_text())['segmentation']['ros__parameters']['family']
+        family = yaml.safe_load(path.read_text())['/**/segmentation']['ros__parameters']['family']
         assert family == {'cs': 'clipseg', 'fs': 'fastsam'}[model]

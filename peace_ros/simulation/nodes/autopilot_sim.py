@@ -37,6 +37,8 @@ class AutopilotSimNode(PeaceNode):
         parameters = self.filled(AutopilotParameters)
         chosen = self.filled(AutopilotSimOptions)
         self._sim = AutopilotSim(parameters)
+        if chosen.ground_station_address is not None:
+            self._sim.call(*chosen.ground_station_address)
         self._pose_period_ns = round(1e9 / chosen.pose_rate)
         self._pose_due_ns = 0
         self._clock_due_s = 0.0
