@@ -14,7 +14,12 @@ from sensor_msgs.msg import CompressedImage, Image
 
 from peace_ros.core.domain import PeaceError
 from peace_ros.core.landing import LandingCore
-from peace_ros.core.messages import depth_from_image, frame_from_message, heatmap_from_image
+from peace_ros.core.messages import (
+    depth_from_image,
+    frame_from_message,
+    heatmap_from_image,
+    stamp_ns_of,
+)
 from peace_ros.core.node_parameters import LandingOptions
 from peace_ros.nodes.qos import IMAGE_IN
 from peace_ros.nodes.runtime import PeaceNode
@@ -56,12 +61,14 @@ class LandingInputs:
         self._heatmaps: deque[Image] = deque(maxlen=_WAITING)
         self._depths: deque[Image] = deque(maxlen=_WAITING)
         self._images: deque[ImageMessage] = deque(maxlen=_WAITING)
+        self._heatmap_arrived = node.diagnostics.watch('heatmap')
         node.create_subscription(Image, 'heatmap', self._on_heatmap, IMAGE_IN)
         node.create_subscription(Image, 'depth', self._on_depth, IMAGE_IN)
         if options.registration:
             subscribe_images(node, options.image_transport, self._on_image)
 
     def _on_heatmap(self, message: Image) -> None:
+        self._heatmap_arrived(stamp_ns_of(message))
         self._heatmaps.append(message)
 
     def _on_depth(self, message: Image) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 from rclpy.clock import Clock, ClockType
 
-from peace_ros.core.domain import Setpoint, Telemetry, VehicleError
+from peace_ros.core.domain import Health, Setpoint, Telemetry, VehicleError
 from peace_ros.core.landing import (
     SILENT_STATES,
     Decision,
@@ -21,15 +21,20 @@ from peace_ros.core.landing import (
     LandingParameters,
     State,
     engagement_problem,
+    readiness,
 )
 from peace_ros.core.mapping import MapParameters
 from peace_ros.core.node_parameters import CameraOptions, LandingOptions, groups_of
 from peace_ros.core.vehicle import SenderParameters, SetpointSender, VehicleParameters
+from peace_ros.nodes.diagnostics import several_publishers
 from peace_ros.nodes.engagement import EngagementServices
 from peace_ros.nodes.inputs import LandingInputs
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.status import DecisionPublisher, VehicleSituation
 from peace_ros.nodes.vehicle_access import VehicleAccess
+
+_ONE_SOURCE = ('image', 'image/compressed', 'prompt', 'heatmap', 'landing/status')
+"""Topics with one publisher at most; two of ``landing/status`` are two landing nodes."""
 
 
 class LandingNode(PeaceNode):
@@ -56,6 +61,8 @@ class LandingNode(PeaceNode):
         self._publisher = DecisionPublisher(self)
         self._access = VehicleAccess(self, self._options, self.filled(VehicleParameters))
         self._inputs = LandingInputs(self, self._options)
+        self.diagnostics.hardware_id = self._access.name
+        self.diagnostics.add('landing', self._readiness)
         self._engagement = EngagementServices(self, self._access, auto=self._options.auto_engage)
         # A ROS-time timer would stand still with a clock that stops or jumps.
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -108,9 +115,15 @@ class LandingNode(PeaceNode):
         with self._lock:
             stamp_ns = self._core.safety_map.stamp_ns
             map_age_s = inf if stamp_ns is None else (self.clock_ns() - stamp_ns) / 1e9
-            return self._access.vehicle_problem or engagement_problem(
-                self._state, told, age_s, map_age_s, self._landing
+            return (
+                several_publishers(self, _ONE_SOURCE)
+                or self._access.vehicle_problem
+                or engagement_problem(self._state, told, age_s, map_age_s, self._landing)
             )
+
+    def _readiness(self) -> Health:
+        several = several_publishers(self, _ONE_SOURCE)
+        return readiness(self._state, several, self.check_engagement())
 
     def begin(self) -> str:
         """Begin the landing of a vehicle that obeys; return what speaks against it, or nothing."""

@@ -11,13 +11,14 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from peace_ros.core.domain import PeaceError
-from peace_ros.core.messages import frame_from_message
+from peace_ros.core.domain import Health, Level, PeaceError
+from peace_ros.core.health import WorkHealth
+from peace_ros.core.messages import frame_from_message, stamp_ns_of
 from peace_ros.core.node_parameters import PromptGeneratorOptions, groups_of
 from peace_ros.core.pipeline import create_generator
 from peace_ros.core.prompting import PromptGenerator, PromptingParameters, resolve_template
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
-from peace_ros.nodes.messages import ERROR, OK, diagnostic_array, prompt_to_message
+from peace_ros.nodes.messages import prompt_to_message
 from peace_ros.nodes.qos import RESULT
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.worker import NewestWorker
@@ -42,12 +43,16 @@ class PromptGeneratorNode(PeaceNode):
         self._generator = generator or create_generator(parameters, self.get_logger())
         self._last_template = ''
         self._prompt_out = self.create_publisher(DiagnosticArray, 'prompt', RESULT)
-        self._diagnostics_out = self.create_publisher(DiagnosticArray, '/diagnostics', RESULT)
+        self._image_arrived = self.diagnostics.watch('image')
+        self._work = WorkHealth()
+        self.diagnostics.add('prompts', self._work.take)
         self._worker = NewestWorker(self._generate, self._complain, self.fail, 'prompt_generator')
-        subscribe_images(
-            self, self.filled(PromptGeneratorOptions).image_transport, self._worker.offer
-        )
+        subscribe_images(self, self.filled(PromptGeneratorOptions).image_transport, self._on_image)
         self.get_logger().info(f'ready: template {resolve_template(parameters.template)!r}')
+
+    def _on_image(self, message: ImageMessage) -> None:
+        self._image_arrived(stamp_ns_of(message))
+        self._worker.offer(message)
 
     def _generate(self, message: ImageMessage) -> None:
         began = time.monotonic()
@@ -62,15 +67,11 @@ class PromptGeneratorNode(PeaceNode):
             ('work_s', f'{time.monotonic() - began:.3f}'),
             ('dropped_frames', str(self._worker.dropped)),
         )
-        self._diagnostics_out.publish(
-            diagnostic_array(prompt.stamp_ns, 'prompt_generator', OK, 'running', values)
-        )
+        self._work.put(Health(Level.OK, 'running', values))
 
     def _complain(self, error: PeaceError) -> None:
         self.say(type(error).__name__, f'no prompt for this frame: {error}')
-        self._diagnostics_out.publish(
-            diagnostic_array(self.clock_ns(), 'prompt_generator', ERROR, str(error), ())
-        )
+        self._work.put(Health(Level.ERROR, str(error)))
 
     def close(self) -> None:
         """Stop the worker."""

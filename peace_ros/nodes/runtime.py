@@ -21,6 +21,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from peace_ros.core.domain import ConfigurationError, PeaceError
 from peace_ros.core.node_parameters import Group
+from peace_ros.nodes.diagnostics import Diagnostics
 from peace_ros.nodes.failure import EXIT_FAILED, Failure
 from peace_ros.nodes.parameters import (
     declare_parameters,
@@ -57,6 +58,7 @@ class PeaceNode(Node):  # type: ignore[misc]
         except PeaceError:
             self.destroy_node()
             raise
+        self.diagnostics = Diagnostics(self)
         self._failure = Failure()
         self._endings: SimpleQueue[None] = SimpleQueue()
         """A queue, because a signal handler may put into it wherever it interrupts."""

@@ -12,7 +12,8 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CompressedImage, Image
 
-from peace_ros.core.domain import Frame, Heatmap, PeaceError, Prompt
+from peace_ros.core.domain import Frame, Health, Heatmap, Level, PeaceError, Prompt
+from peace_ros.core.health import WorkHealth
 from peace_ros.core.messages import frame_from_message, prompt_from_message, stamp_ns_of
 from peace_ros.core.node_parameters import SegmentationOptions, groups_of
 from peace_ros.core.pipeline import Pipeline
@@ -25,14 +26,7 @@ from peace_ros.core.segmentation import (
     family_of,
 )
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
-from peace_ros.nodes.messages import (
-    ERROR,
-    OK,
-    WARN,
-    diagnostic_array,
-    heatmap_to_image,
-    jpeg_message,
-)
+from peace_ros.nodes.messages import heatmap_to_image, jpeg_message
 from peace_ros.nodes.prompts import PromptBoard
 from peace_ros.nodes.qos import IMAGE_OUT, RESULT
 from peace_ros.nodes.runtime import PeaceNode, run
@@ -66,10 +60,13 @@ class SegmentationNode(PeaceNode):
         self._prepared: set[str] = set()
         self._heatmap_out = self.create_publisher(Image, 'heatmap', IMAGE_OUT)
         self._overlay_out = self.create_publisher(CompressedImage, 'overlay/compressed', IMAGE_OUT)
-        self._diagnostics_out = self.create_publisher(DiagnosticArray, '/diagnostics', RESULT)
+        self._image_arrived = self.diagnostics.watch('image')
+        self._work = WorkHealth()
+        self.diagnostics.add('heatmaps', self._work.take)
         self._preparer = NewestWorker(self._prepare, self._complain, self.fail, 'prepare')
         self._worker = NewestWorker(self._segment, self._complain, self.fail, _NAME)
         if self._static is None:
+            self._prompt_arrived = self.diagnostics.watch('prompt')
             self.create_subscription(DiagnosticArray, 'prompt', self._on_prompt, RESULT)
         subscribe_images(self, self._options.image_transport, self._on_image)
         waits = 'waits for prompts' if self._static is None else 'static'
@@ -81,6 +78,7 @@ class SegmentationNode(PeaceNode):
         return create_segmenter(parameters, own, log=self.get_logger())
 
     def _on_image(self, message: ImageMessage) -> None:
+        self._image_arrived(stamp_ns_of(message))
         if self._static is None and self._board.is_empty:
             self.say(
                 'waiting',
@@ -90,6 +88,7 @@ class SegmentationNode(PeaceNode):
         self._worker.offer(message)
 
     def _on_prompt(self, message: DiagnosticArray) -> None:
+        self._prompt_arrived(stamp_ns_of(message))
         try:
             prompt = prompt_from_message(message)
         except PeaceError as error:
@@ -134,10 +133,10 @@ class SegmentationNode(PeaceNode):
         )
 
     def _report(self, at_ns: int, prompt: Prompt, *, own: bool, work_s: float) -> None:
-        level, sentence = OK, 'running'
+        level, sentence = Level.OK, 'running'
         if not own:
             age_s = (at_ns - prompt.stamp_ns) / 1e9
-            level = WARN
+            level = Level.WARN
             sentence = (
                 f'no prompt for this frame within {self._options.prompt_timeout} s: using the one '
                 f'made {age_s:.2f} s before it'
@@ -147,7 +146,7 @@ class SegmentationNode(PeaceNode):
             )
             self.say('prompt', sentence)
         if work_s > _SLOW_S:
-            level = WARN
+            level = Level.WARN
             sentence = (
                 f'a frame takes {work_s:.1f} s, at most {_SLOW_S} s are good: lower '
                 'clipseg_max_looks or the resolution of the camera'
@@ -160,13 +159,11 @@ class SegmentationNode(PeaceNode):
             ('own_prompt', str(own).lower()),
             ('dropped_frames', str(self._worker.dropped)),
         )
-        self._diagnostics_out.publish(diagnostic_array(at_ns, _NAME, level, sentence, values))
+        self._work.put(Health(level, sentence, values))
 
     def _complain(self, error: PeaceError) -> None:
         self.say(type(error).__name__, f'no heatmap: {error}')
-        self._diagnostics_out.publish(
-            diagnostic_array(self.clock_ns(), _NAME, ERROR, str(error), ())
-        )
+        self._work.put(Health(Level.ERROR, str(error)))
 
     def close(self) -> None:
         """Stop the workers."""

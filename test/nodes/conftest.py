@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from peace_ros.core.vehicle import VehicleParameters, open_vehicle
 from peace_ros.nodes.messages import image_message
+from peace_ros.nodes.qos import RESULT
 from peace_ros.nodes.runtime import PeaceNode
 from peace_ros.simulation.demo.pilot import Pilot
 
@@ -71,6 +72,20 @@ class Bench:
 
         self.peer.create_subscription(kind, topic, keep, profile)
         return messages
+
+    def findings(self, task: str) -> list[DiagnosticStatus]:
+        """Return a list that gets what /diagnostics says of a task that had work."""
+        found: list[DiagnosticStatus] = []
+
+        def keep(message: DiagnosticArray) -> None:
+            found.extend(
+                each
+                for each in message.status
+                if each.name.endswith(f': {task}') and 'nothing to do' not in each.message
+            )
+
+        self.peer.create_subscription(DiagnosticArray, '/diagnostics', keep, RESULT)
+        return found
 
     def offer(self, kind: Any, topic: str, profile: Any) -> Any:
         """Return a publisher once the node under test listens."""
@@ -129,8 +144,12 @@ def picture() -> Callable[[int], Any]:
 
 
 @pytest.fixture
-def values_of() -> Callable[[DiagnosticArray], dict[str, str]]:
-    return lambda message: {each.key: each.value for each in message.status[0].values}
+def values_of() -> Callable[[DiagnosticArray | DiagnosticStatus], dict[str, str]]:
+    def values(message: DiagnosticArray | DiagnosticStatus) -> dict[str, str]:
+        status = message.status[0] if isinstance(message, DiagnosticArray) else message
+        return {each.key: each.value for each in status.values}
+
+    return values
 
 
 @pytest.fixture

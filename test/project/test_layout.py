@@ -11,8 +11,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'peace_ros'
-LINES_OF_WHAT_FLIES = 14_830
-"""Of core and nodes: 14,500, and what learns a biased velocity and finds faulty axes."""
+LINES_OF_WHAT_FLIES = 15_080
+"""Of core and nodes: 14,800, and diagnostics of every input (240)."""
 LINES_OF_A_NODE_FILE = 200
 
 

@@ -11,6 +11,7 @@ from peace_ros.core.domain.errors import (
     VehicleError,
     WorldError,
 )
+from peace_ros.core.domain.health import Health, Level
 from peace_ros.core.domain.labels import SAFE_LABELS, Label, is_safe
 from peace_ros.core.domain.motion import Pose, Setpoint, Site, Telemetry
 from peace_ros.core.domain.perception import Camera, DepthImage, Frame, Heatmap, Prompt, RankedWord
@@ -22,9 +23,11 @@ __all__ = [
     'ConfigurationError',
     'DepthImage',
     'Frame',
+    'Health',
     'Heatmap',
     'ImageError',
     'Label',
+    'Level',
     'PeaceError',
     'Pose',
     'Prompt',

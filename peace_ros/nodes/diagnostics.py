@@ -1,0 +1,85 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``/diagnostics``, once per second of the steady clock, also when nothing arrives."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
+
+from peace_ros.core.domain import Health, Level
+from peace_ros.core.health import InputWatch, too_many
+from peace_ros.nodes.messages import header
+from peace_ros.nodes.qos import RESULT
+
+if TYPE_CHECKING:
+    from peace_ros.nodes.runtime import PeaceNode
+
+_PERIOD_S = 1.0
+_LEVELS = {
+    Level.OK: DiagnosticStatus.OK,
+    Level.WARN: DiagnosticStatus.WARN,
+    Level.ERROR: DiagnosticStatus.ERROR,
+}
+
+
+class Diagnostics:
+    """The tasks of a node and their findings, named ``namespace/node: task``."""
+
+    def __init__(self, node: PeaceNode) -> None:
+        self._node = node
+        self.hardware_id = socket.gethostname()
+        """What the findings are about: this computer, unless the node says otherwise."""
+        self._tasks: dict[str, Callable[[], Health]] = {}
+        self._out = node.create_publisher(DiagnosticArray, '/diagnostics', RESULT)
+        self._timer = node.create_timer(
+            _PERIOD_S, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+
+    def add(self, task: str, check: Callable[[], Health]) -> None:
+        """Ask a task for its finding from now on."""
+        self._tasks[task] = check
+
+    def watch(self, topic: str, noun: str = '') -> Callable[[int], None]:
+        """Watch an input; return what is to be called with the stamp (ns) of each message.
+
+        Args:
+            topic: as it is subscribed to.
+            noun: what arrives; empty: the name of the topic.
+        """
+        name = self._node.resolve_topic_name(topic)
+        watch = InputWatch(noun or topic, name, time.monotonic())
+        self.add(
+            noun or topic, lambda: watch.health(time.monotonic(), self._node.count_publishers(name))
+        )
+        return lambda stamp_ns: watch.arrived(stamp_ns, self._node.clock_ns(), time.monotonic())
+
+    def _publish(self) -> None:
+        node = self._node.get_fully_qualified_name().lstrip('/')
+        message = DiagnosticArray(header=header(self._node.clock_ns()))
+        for task, check in self._tasks.items():
+            found = check()
+            message.status.append(
+                DiagnosticStatus(
+                    level=_LEVELS[found.level],
+                    name=f'{node}: {task}',
+                    message=found.sentence,
+                    hardware_id=self.hardware_id,
+                    values=[KeyValue(key=key, value=value) for key, value in found.values],
+                )
+            )
+        self._out.publish(message)
+
+
+def several_publishers(node: PeaceNode, topics: Iterable[str]) -> str:
+    """Return which of the topics has more than one publisher; empty when none has."""
+    for topic in topics:
+        name = node.resolve_topic_name(topic)
+        if (count := node.count_publishers(name)) > 1:
+            return too_many(name, count)
+    return ''
