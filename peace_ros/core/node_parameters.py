@@ -45,6 +45,7 @@ class SegmentationOptions(ParameterSet):
         'PEACE',
         'That of the prompt generator; a static one (DD, D, a sentence with {term} only) is used '
         'as it is, without prompts from a topic',
+        live=True,
     )
     prompt_timeout: float = parameter(
         0.3,
@@ -53,11 +54,12 @@ class SegmentationOptions(ParameterSet):
         unit='s',
         low=0.0,
         high=10.0,
+        live=True,
     )
     overlay_threshold: float = parameter(
-        0.5, 'Score from which the overlay shows a pixel as safe', low=0.0, high=1.0
+        0.5, 'Score from which the overlay shows a pixel as safe', low=0.0, high=1.0, live=True
     )
-    overlay_quality: int = parameter(80, 'JPEG quality of the overlay', low=1, high=100)
+    overlay_quality: int = parameter(80, 'JPEG quality of the overlay', low=1, high=100, live=True)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from peace_ros.nodes.messages import header
 from peace_ros.nodes.qos import RESULT
 
 if TYPE_CHECKING:
-    from peace_ros.nodes.runtime import PeaceNode
+    from peace_ros.nodes.node import PeaceNode
 
 _PERIOD_S = 1.0
 _LEVELS = {
@@ -45,18 +45,22 @@ class Diagnostics:
         """Ask a task for its finding from now on."""
         self._tasks[task] = check
 
-    def watch(self, topic: str, noun: str = '') -> Callable[[int], None]:
+    def watch(self, topic: str, unless: Callable[[], str] | None = None) -> Callable[[int], None]:
         """Watch an input; return what is to be called with the stamp (ns) of each message.
 
         Args:
-            topic: as it is subscribed to.
-            noun: what arrives; empty: the name of the topic.
+            topic: as it is subscribed to; its name says what arrives.
+            unless: returns why the input is of no use now, empty when it is.
         """
         name = self._node.resolve_topic_name(topic)
-        watch = InputWatch(noun or topic, name, time.monotonic())
-        self.add(
-            noun or topic, lambda: watch.health(time.monotonic(), self._node.count_publishers(name))
-        )
+        watch = InputWatch(topic, name, time.monotonic())
+
+        def check() -> Health:
+            if unless is not None and (reason := unless()):
+                return Health(Level.OK, reason)
+            return watch.health(time.monotonic(), self._node.count_publishers(name))
+
+        self.add(topic, check)
         return lambda stamp_ns: watch.arrived(stamp_ns, self._node.clock_ns(), time.monotonic())
 
     def _publish(self) -> None:

@@ -21,8 +21,8 @@ from peace_ros.core.messages import (
     stamp_ns_of,
 )
 from peace_ros.core.node_parameters import LandingOptions
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import IMAGE_IN
-from peace_ros.nodes.runtime import PeaceNode
 
 _WAITING = 4
 """Messages that are kept until the next step; older ones are dropped."""

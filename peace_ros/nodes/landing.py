@@ -6,14 +6,13 @@ from __future__ import annotations
 
 import sys
 import threading
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
 
-from peace_ros.core.domain import Health, Setpoint, Telemetry, VehicleError
+from peace_ros.core.domain import ConfigurationError, Health, Setpoint, VehicleError
 from peace_ros.core.landing import (
     SILENT_STATES,
     Decision,
@@ -29,7 +28,8 @@ from peace_ros.core.vehicle import SenderParameters, SetpointSender, VehiclePara
 from peace_ros.nodes.diagnostics import several_publishers
 from peace_ros.nodes.engagement import EngagementServices
 from peace_ros.nodes.inputs import LandingInputs
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.node import PeaceNode
+from peace_ros.nodes.runtime import run
 from peace_ros.nodes.status import DecisionPublisher, VehicleSituation
 from peace_ros.nodes.vehicle_access import VehicleAccess
 
@@ -50,9 +50,7 @@ class LandingNode(PeaceNode):
         super().__init__('landing', *groups_of('landing'), **options)
         self._options = self.filled(LandingOptions)
         self._landing = self.filled(LandingParameters)
-        self._core = LandingCore(
-            self._landing, self.filled(CameraOptions).camera, self.filled(MapParameters)
-        )
+        self._core = self._create_core()
         self._lock = threading.RLock()
         """Guards the core: the engage service runs beside the timer."""
         self._sender: SetpointSender | None = None
@@ -69,6 +67,22 @@ class LandingNode(PeaceNode):
         self.create_timer(1.0 / self._options.rate, self._step, clock=self._steady)
         self.get_logger().info(f'waiting for the vehicle: {self._access.name}')
 
+    def _create_core(self) -> LandingCore:
+        camera, mapping = self.filled(CameraOptions).camera, self.filled(MapParameters)
+        return LandingCore(self._landing, camera, mapping)
+
+    def change(self, filled: Mapping[type[Any], Any]) -> None:
+        """Begin a new map with other thresholds; only while no landing is under way."""
+        if filled[LandingParameters] == self._landing:
+            return
+        with self._lock:
+            if self._state is not State.IDLE:
+                raise ConfigurationError(
+                    f'the landing is in state {self._state.value}: disengage before you change it'
+                )
+            self._landing = filled[LandingParameters]
+            self._core = self._create_core()
+
     def _step(self) -> None:
         if self.failure is not None:
             return
@@ -78,7 +92,7 @@ class LandingNode(PeaceNode):
             for pose in () if link is None else link.take_poses():
                 self._core.add_pose(pose)
             self._inputs.feed(self._core)
-            told, age_s = self._telemetry()
+            told, age_s = self._access.telemetry()
             decision = self._core.step(at_ns, told, age_s)
             self._submit(decision)
         sender = '' if self._sender is None else self._sender.statistics().state.value
@@ -86,13 +100,6 @@ class LandingNode(PeaceNode):
         self._publisher.publish(decision, situation, at_ns)
         self._access.follow(decision)
         self._engagement.engage_when_ready()
-
-    def _telemetry(self) -> tuple[Telemetry | None, float]:
-        link = self._access.link
-        told = None if link is None else link.telemetry()
-        if told is None or told.received_ns == 0:
-            return None, inf
-        return told, (time.monotonic_ns() - told.received_ns) / 1e9
 
     def _submit(self, decision: Decision) -> None:
         if decision.state is not self._state:
@@ -111,7 +118,7 @@ class LandingNode(PeaceNode):
 
     def check_engagement(self) -> str:
         """Return why a landing cannot begin now, empty when it can."""
-        told, age_s = self._telemetry()
+        told, age_s = self._access.telemetry()
         with self._lock:
             stamp_ns = self._core.safety_map.stamp_ns
             map_age_s = inf if stamp_ns is None else (self.clock_ns() - stamp_ns) / 1e9

@@ -2,17 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """ROS parameters declared from the dataclasses that hold them.
 
-All parameters are read-only: a node is configured when it starts, and a flight is not the time
-to change it.
+Parameters are read-only, but for those that are declared as live: most of a node is configured when
+it starts, and a flight is not the time to change it.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from sys import float_info
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
@@ -63,6 +65,31 @@ def declare_parameters(node: Node, parameters: type[_Parameters], group: str = '
             ros_name(group, info), value, descriptor_of(info), ignore_override=True
         )
     return filled
+
+
+def changed_parameters(
+    filled: Mapping[type[Any], Any], groups: Sequence[Group], given: Mapping[str, Any]
+) -> dict[type[Any], Any]:
+    """Return the dataclasses in which a value changes, with the new values.
+
+    Args:
+        filled: the dataclasses so far.
+        groups: their names.
+        given: ROS name -> new value; names of others (``use_sim_time``) are passed over.
+
+    Raises:
+        ConfigurationError: a value of another type or outside its bounds.
+    """
+    changed = {}
+    for group, parameters in groups:
+        values = {
+            info.name: converted(name, info, given[name])
+            for info in describe(parameters)
+            if (name := ros_name(group, info)) in given
+        }
+        if values:
+            changed[parameters] = replace(filled[parameters], **values)
+    return changed
 
 
 def refuse_unknown(node: Node, *groups: Group) -> None:
@@ -120,9 +147,11 @@ def _only_in_wildcards(arguments: list[str], node: str) -> dict[str, str]:
 
 
 def descriptor_of(info: ParameterInfo) -> ParameterDescriptor:
-    """Return the ROS descriptor of a parameter: meaning, unit, bounds; always read-only."""
+    """Return the ROS descriptor of a parameter: meaning, unit, bounds, whether it is live."""
     unit = f' [{info.unit}]' if info.unit else ''
-    descriptor = ParameterDescriptor(description=f'{info.description}{unit}', read_only=True)
+    descriptor = ParameterDescriptor(
+        description=f'{info.description}{unit}', read_only=not info.live
+    )
     if info.choices:
         descriptor.additional_constraints = f'one of: {", ".join(info.choices)}'
     if isinstance(info.default, bool) or (info.low is None and info.high is None):

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -19,8 +19,9 @@ from peace_ros.core.pipeline import create_generator
 from peace_ros.core.prompting import PromptGenerator, PromptingParameters, resolve_template
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
 from peace_ros.nodes.messages import prompt_to_message
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import RESULT
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.runtime import run
 from peace_ros.nodes.worker import NewestWorker
 
 
@@ -49,6 +50,14 @@ class PromptGeneratorNode(PeaceNode):
         self._worker = NewestWorker(self._generate, self._complain, self.fail, 'prompt_generator')
         subscribe_images(self, self.filled(PromptGeneratorOptions).image_transport, self._on_image)
         self.get_logger().info(f'ready: template {resolve_template(parameters.template)!r}')
+
+    def change(self, filled: Mapping[type[Any], Any]) -> None:
+        """Use another template, vocabularies or way of ranking from the next frame on."""
+        parameters: PromptingParameters = filled[PromptingParameters]
+        if parameters != self.filled(PromptingParameters):
+            self._generator = create_generator(
+                parameters, self.get_logger(), self._generator.encoder
+            )
 
     def _on_image(self, message: ImageMessage) -> None:
         self._image_arrived(stamp_ns_of(message))

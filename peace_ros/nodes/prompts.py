@@ -8,9 +8,28 @@ import threading
 from collections import OrderedDict
 
 from peace_ros.core.domain import Prompt
+from peace_ros.core.node_parameters import SegmentationOptions
+from peace_ros.core.prompting import categories_of, resolve_template
 
 _KEPT = 64
 """Prompts that wait; more frames than this never lie between a frame and its prompt."""
+
+
+def static_prompt(options: SegmentationOptions) -> Prompt | None:
+    """Return the prompt of a template without vocabulary words, None when prompts are awaited."""
+    template = resolve_template(options.template)
+    return None if categories_of(template) else Prompt(template, 0)
+
+
+def prompt_of_another_frame(prompt: Prompt, at_ns: int, timeout_s: float) -> str:
+    """Return the sentence about a frame (its stamp) that got the prompt of another one."""
+    age_s = (at_ns - prompt.stamp_ns) / 1e9
+    if age_s > 0.0:
+        return (
+            f'no prompt for this frame within {timeout_s} s: using the one made {age_s:.2f} s '
+            'before it'
+        )
+    return f'the prompt generator skipped this frame: using the prompt made {-age_s:.2f} s after it'
 
 
 class PromptBoard:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -17,19 +17,20 @@ from peace_ros.core.health import WorkHealth
 from peace_ros.core.messages import frame_from_message, prompt_from_message, stamp_ns_of
 from peace_ros.core.node_parameters import SegmentationOptions, groups_of
 from peace_ros.core.pipeline import Pipeline
-from peace_ros.core.prompting import categories_of, resolve_template
 from peace_ros.core.segmentation import (
     SegmentationParameters,
     Segmenter,
     create_segmenter,
     draw_overlay,
     family_of,
+    load_terms,
 )
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
 from peace_ros.nodes.messages import heatmap_to_image, jpeg_message
-from peace_ros.nodes.prompts import PromptBoard
+from peace_ros.nodes.node import PeaceNode
+from peace_ros.nodes.prompts import PromptBoard, prompt_of_another_frame, static_prompt
 from peace_ros.nodes.qos import IMAGE_OUT, RESULT
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.runtime import run
 from peace_ros.nodes.worker import NewestWorker
 
 _NAME = 'segmentation'
@@ -53,8 +54,7 @@ class SegmentationNode(PeaceNode):
         """
         super().__init__(_NAME, *groups_of(_NAME), **options)
         self._options = self.filled(SegmentationOptions)
-        template = resolve_template(self._options.template)
-        self._static = None if categories_of(template) else Prompt(template, 0)
+        self._static = static_prompt(self._options)
         self._pipeline = Pipeline(segmenter or self._create_segmenter())
         self._board = PromptBoard()
         self._prepared: set[str] = set()
@@ -65,17 +65,32 @@ class SegmentationNode(PeaceNode):
         self.diagnostics.add('heatmaps', self._work.take)
         self._preparer = NewestWorker(self._prepare, self._complain, self.fail, 'prepare')
         self._worker = NewestWorker(self._segment, self._complain, self.fail, _NAME)
-        if self._static is None:
-            self._prompt_arrived = self.diagnostics.watch('prompt')
-            self.create_subscription(DiagnosticArray, 'prompt', self._on_prompt, RESULT)
+        self._prompt_arrived = self.diagnostics.watch(
+            'prompt', unless=lambda: '' if self._static is None else 'not used: static template'
+        )
+        self.create_subscription(DiagnosticArray, 'prompt', self._on_prompt, RESULT)
         subscribe_images(self, self._options.image_transport, self._on_image)
         waits = 'waits for prompts' if self._static is None else 'static'
-        self.get_logger().info(f'ready: template {template!r} ({waits})')
+        self.get_logger().info(f'ready: template {self._options.template!r} ({waits})')
 
     def _create_segmenter(self) -> Segmenter:
         parameters = self.filled(SegmentationParameters)
         own = self.filled(family_of(parameters).parameters)
         return create_segmenter(parameters, own, log=self.get_logger())
+
+    def change(self, filled: Mapping[type[Any], Any]) -> None:
+        """Use other terms, another template or overlay from the next frame on."""
+        options: SegmentationOptions = filled[SegmentationOptions]
+        terms = filled[SegmentationParameters].terms
+        segmenter, static = self._pipeline.segmenter, static_prompt(options)
+        if terms != self.filled(SegmentationParameters).terms:
+            segmenter = segmenter.with_terms(load_terms(terms))
+        if static is not None:
+            segmenter.prepare(static)
+        self._options, self._static = options, static
+        if segmenter is not self._pipeline.segmenter:
+            self._pipeline.segmenter = segmenter
+            self._prepared.clear()
 
     def _on_image(self, message: ImageMessage) -> None:
         self._image_arrived(stamp_ns_of(message))
@@ -89,6 +104,8 @@ class SegmentationNode(PeaceNode):
 
     def _on_prompt(self, message: DiagnosticArray) -> None:
         self._prompt_arrived(stamp_ns_of(message))
+        if self._static is not None:
+            return
         try:
             prompt = prompt_from_message(message)
         except PeaceError as error:
@@ -135,15 +152,8 @@ class SegmentationNode(PeaceNode):
     def _report(self, at_ns: int, prompt: Prompt, *, own: bool, work_s: float) -> None:
         level, sentence = Level.OK, 'running'
         if not own:
-            age_s = (at_ns - prompt.stamp_ns) / 1e9
             level = Level.WARN
-            sentence = (
-                f'no prompt for this frame within {self._options.prompt_timeout} s: using the one '
-                f'made {age_s:.2f} s before it'
-                if age_s > 0.0
-                else f'the prompt generator skipped this frame: using the prompt made '
-                f'{-age_s:.2f} s after it'
-            )
+            sentence = prompt_of_another_frame(prompt, at_ns, self._options.prompt_timeout)
             self.say('prompt', sentence)
         if work_s > _SLOW_S:
             level = Level.WARN

@@ -16,7 +16,7 @@ from peace_ros.core.threads import GuardedThread
 from peace_ros.nodes.failure import EXIT_FAILED
 
 if TYPE_CHECKING:
-    from peace_ros.nodes.runtime import PeaceNode
+    from peace_ros.nodes.node import PeaceNode
 
 _SHUTDOWN_S = 2.0
 

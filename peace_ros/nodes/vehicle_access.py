@@ -7,20 +7,21 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
+from math import inf
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, Twist
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.core.domain import ConfigurationError, Pose, Setpoint, VehicleError
+from peace_ros.core.domain import ConfigurationError, Pose, Setpoint, Telemetry, VehicleError
 from peace_ros.core.landing import Decision, State
 from peace_ros.core.messages import pose_from_message, pose_from_transform
 from peace_ros.core.node_parameters import LandingOptions
 from peace_ros.core.vehicle import VehicleLink, VehicleParameters, check_access, open_vehicle
 from peace_ros.nodes.connection import Connection
 from peace_ros.nodes.handover import AfterHandover
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import COMMAND, POSE_IN
-from peace_ros.nodes.runtime import PeaceNode
 from peace_ros.nodes.twist_link import TwistLink
 
 _TRY_S = 3.0
@@ -94,6 +95,14 @@ class VehicleAccess:
         if link is None:
             return self.problem
         return link.problem or link.position_problem
+
+    def telemetry(self) -> tuple[Telemetry | None, float]:
+        """Return what the vehicle last said and how old (s) it is; None and infinite before."""
+        link = self.link
+        told = None if link is None else link.telemetry()
+        if told is None or told.received_ns == 0:
+            return None, inf
+        return told, (time.monotonic_ns() - told.received_ns) / 1e9
 
     def follow(self, decision: Decision) -> None:
         """Report our health to the vehicle, and do what follows a hand-over; once per step."""

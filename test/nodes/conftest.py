@@ -20,8 +20,8 @@ from rclpy.parameter import Parameter
 
 from peace_ros.core.vehicle import VehicleParameters, open_vehicle
 from peace_ros.nodes.messages import image_message
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import RESULT
-from peace_ros.nodes.runtime import PeaceNode
 from peace_ros.simulation.demo.pilot import Pilot
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'

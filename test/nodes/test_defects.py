@@ -259,7 +259,8 @@ BROKEN_NODE = """
 import sys, time
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.node import PeaceNode
+from peace_ros.nodes.runtime import run
 
 class BrokenNode(PeaceNode):
     def __init__(self):

@@ -21,7 +21,7 @@ from peace_ros.lab.parameter_docs import (
     defaults_yaml,
     markdown,
 )
-from peace_ros.nodes.runtime import PeaceNode
+from peace_ros.nodes.node import PeaceNode
 
 ROOT = Path(__file__).resolve().parents[2]
 PRESETS = ROOT / 'config' / 'presets'
@@ -34,6 +34,17 @@ class Sample(ParameterSet):
     name: str = parameter('a', 'Which one', choices=('a', 'b'))
     active: bool = parameter(default=False, description='Whether')
     providers: tuple[str, ...] = parameter(('x', 'y'), 'In order')
+
+
+@dataclass(frozen=True)
+class Live(ParameterSet):
+    low: float = parameter(0.5, 'Lower end', low=0.0, high=5.0, live=True)
+    high: float = parameter(1.0, 'Upper end', low=0.0, high=5.0, live=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.low > self.high:
+            raise ConfigurationError(f'low {self.low} above high {self.high}')
 
 
 def node_with(**values: object) -> PeaceNode:
@@ -61,10 +72,40 @@ def test_a_given_value_arrives_and_a_whole_number_serves_as_a_float():
     node.destroy_node()
 
 
-def test_no_parameter_can_be_changed_in_flight():
+def test_a_parameter_that_is_not_live_is_read_only():
     node = node_with()
     (result,) = node.set_parameters([Parameter('speed', value=2.0)])
     assert not result.successful
+    assert 'read-only' in result.reason
+    node.destroy_node()
+
+
+def change(node: PeaceNode, **values: object):
+    given = [Parameter(name, value=value) for name, value in values.items()]
+    return node.set_parameters_atomically(given)
+
+
+def test_live_parameters_change_together_or_not_at_all():
+    node = PeaceNode('sample', ('', Live))
+    assert change(node, low=2.0, high=3.0).successful
+    assert node.filled(Live) == Live(low=2.0, high=3.0)
+    refused = change(node, low=4.0, high=3.5)
+    assert (refused.successful, refused.reason) == (False, 'low 4.0 above high 3.5')
+    assert not change(node, low=2.5, high=99.0).successful
+    assert node.filled(Live) == Live(low=2.0, high=3.0)
+    assert node.get_parameter('low').value == 2.0
+    node.destroy_node()
+
+
+def test_what_the_node_itself_refuses_does_not_change():
+    class Busy(PeaceNode):
+        def change(self, filled):
+            raise ConfigurationError('busy')
+
+    node = Busy('sample', ('', Live))
+    refused = change(node, low=0.7)
+    assert (refused.successful, refused.reason) == (False, 'busy')
+    assert node.filled(Live) == Live()
     node.destroy_node()
 
 

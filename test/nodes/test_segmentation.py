@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import CompressedImage, Image
 
 from peace_ros.core.domain import Heatmap, Prompt
@@ -183,3 +184,14 @@ def test_a_covered_lens_gives_no_heatmap_and_says_why(bench, picture):
     bench.until(lambda: bool(diagnostics), lambda: images.publish(covered))
     assert 'one colour' in diagnostics[-1].message
     assert not painter.seen
+
+
+def test_a_template_without_words_needs_no_prompts_from_then_on(bench, picture):
+    painter = Painter()
+    node = bench.run(SegmentationNode, painter)
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    images.publish(picture(1))
+    assert node.set_parameters([Parameter('template', value='DD')])[0].successful
+    bench.until(lambda: bool(painter.seen), lambda: images.publish(picture(2)))
+    assert painter.seen[0][1].template == 'A photo of {term}.'
+    assert not node.set_parameters([Parameter('template', value='no term')])[0].successful

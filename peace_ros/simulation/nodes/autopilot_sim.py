@@ -15,8 +15,9 @@ from geometry_msgs.msg import PoseStamped
 from rosgraph_msgs.msg import Clock
 
 from peace_ros.nodes.messages import pose_to_message, time_from_ns
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import CLOCK, POSE
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.runtime import run
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
 from peace_ros.simulation.nodes.options import AUTOPILOT_SIM, AutopilotSimOptions
 

@@ -14,8 +14,9 @@ from sensor_msgs.msg import CameraInfo, Image
 from peace_ros.core.domain import PeaceError, Pose
 from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.nodes.messages import image_message
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import IMAGE_OUT, RESULT
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.runtime import run
 from peace_ros.nodes.worker import NewestWorker
 from peace_ros.simulation.camera import NadirCamera
 from peace_ros.simulation.nodes.messages import camera_info
