@@ -24,7 +24,14 @@ DATA_LEFT_OUT = ['ament/*', 'annotations/*']
 # ROS looks for launch files and what they name under share/, for nothing else.
 SHARED = ('config/*.yaml', 'config/*.xml', 'config/presets/*.yaml')
 
-NODES = ('prompt_generator', 'segmentation', 'landing', 'satellite_view', 'autopilot_sim')
+NODES = (
+    'prompt_generator',
+    'segmentation',
+    'perception',
+    'landing',
+    'satellite_view',
+    'autopilot_sim',
+)
 
 
 def _share() -> list[tuple[str, list[str]]]:

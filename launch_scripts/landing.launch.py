@@ -23,10 +23,11 @@ from peace_ros.core.resources import config_dir
 PACKAGE = 'peace_ros'
 PRESETS = sorted(path.stem for path in (config_dir() / 'presets').glob('*.yaml'))
 DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+COMPOSED, SEPARATE = 'perception', ('prompt_generator', 'segmentation')
 RESPAWN_DELAY_S = 2.0
 BOOLEANS = ['true', 'false']
 
-OF_ALL_NODES = {'use_sim_time': bool}
+OF_ALL_NODES = {'use_sim_time': bool, 'autostart': bool}
 """Arguments that are parameters of the nodes, with their types."""
 OF_PERCEPTION = {'image_transport': str}
 OF_LANDING = {
@@ -52,6 +53,8 @@ ARGUMENTS: tuple[tuple[str, Any, str, list[str] | None], ...] = (
         'Least severity that is logged',
         ['debug', 'info', 'warn', 'error', 'fatal'],
     ),
+    ('autostart', 'true', 'Configure and activate the nodes; else a lifecycle manager', BOOLEANS),
+    ('use_composition', 'false', 'Prompt generator and segmentation in one process', BOOLEANS),
     ('use_respawn', 'false', 'Start a perception node again when it has ended', BOOLEANS),
     (
         'discovery_range',
@@ -106,7 +109,8 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
         return Node(
             package=PACKAGE,
             executable=name,
-            name=name,
+            # One name would rename both nodes of a composed process.
+            name=None if name == COMPOSED else name,
             namespace=given['namespace'],
             output='screen',
             parameters=[*files, chosen],
@@ -121,9 +125,12 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
         )
 
     respawn = given['use_respawn'] == 'true'
+    composed = given['use_composition'] == 'true'
     return [
-        create('prompt_generator', OF_PERCEPTION, respawn=respawn),
-        create('segmentation', OF_PERCEPTION, respawn=respawn),
+        *(
+            create(name, OF_PERCEPTION, respawn=respawn)
+            for name in ((COMPOSED,) if composed else SEPARATE)
+        ),
         # Never again by itself: where it engages automatically, it would after a takeover, too.
         create('landing', OF_LANDING, respawn=False),
     ]

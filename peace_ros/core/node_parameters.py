@@ -26,6 +26,17 @@ _TRANSPORTS = ('raw', 'compressed')
 
 
 @dataclass(frozen=True)
+class LifecycleOptions(ParameterSet):
+    """Options of every node that flies."""
+
+    autostart: bool = parameter(
+        True,
+        'Configure and activate the node when it starts; off: a lifecycle manager or '
+        'ros2 lifecycle does it',
+    )
+
+
+@dataclass(frozen=True)
 class PromptGeneratorOptions(ParameterSet):
     """Options of the prompt_generator node."""
 
@@ -129,18 +140,24 @@ def groups_of(node: str) -> tuple[Group, ...]:
     if node == 'prompt_generator':
         from peace_ros.core.prompting import PromptingParameters
 
-        return ('', PromptingParameters), ('', PromptGeneratorOptions)
+        return ('', PromptingParameters), ('', PromptGeneratorOptions), ('', LifecycleOptions)
     if node == 'segmentation':
         from peace_ros.core.segmentation import FAMILIES, SegmentationParameters
 
         families = [('', family.parameters) for family in FAMILIES.values()]
-        return ('', SegmentationParameters), *families, ('', SegmentationOptions)
+        return (
+            ('', SegmentationParameters),
+            *families,
+            ('', SegmentationOptions),
+            ('', LifecycleOptions),
+        )
     if node == 'landing':
         from peace_ros.core.landing import LandingParameters
         from peace_ros.core.mapping import MapParameters
         from peace_ros.core.vehicle import SenderParameters, VehicleParameters
 
         return (
+            ('', LifecycleOptions),
             ('', LandingOptions),
             ('', CameraOptions),
             ('', LandingParameters),

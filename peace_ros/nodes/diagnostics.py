@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from peace_ros.nodes.node import PeaceNode
 
 _PERIOD_S = 1.0
+_ONE_SOURCE = ('image', 'image/compressed', 'prompt', 'heatmap', 'landing/status')
+"""Topics with one publisher at most; two of ``landing/status`` are two landing nodes."""
 _LEVELS = {
     Level.OK: DiagnosticStatus.OK,
     Level.WARN: DiagnosticStatus.WARN,
@@ -35,6 +37,8 @@ class Diagnostics:
         self._node = node
         self.hardware_id = socket.gethostname()
         """What the findings are about: this computer, unless the node says otherwise."""
+        self.inactive = ''
+        """Why the node does not work now, instead of all findings; empty while it works."""
         self._tasks: dict[str, Callable[[], Health]] = {}
         self._out = node.create_publisher(DiagnosticArray, '/diagnostics', RESULT)
         self._timer = node.create_timer(
@@ -44,6 +48,10 @@ class Diagnostics:
     def add(self, task: str, check: Callable[[], Health]) -> None:
         """Ask a task for its finding from now on."""
         self._tasks[task] = check
+
+    def clear(self) -> None:
+        """Forget all tasks."""
+        self._tasks.clear()
 
     def watch(self, topic: str, unless: Callable[[], str] | None = None) -> Callable[[int], None]:
         """Watch an input; return what is to be called with the stamp (ns) of each message.
@@ -66,8 +74,9 @@ class Diagnostics:
     def _publish(self) -> None:
         node = self._node.get_fully_qualified_name().lstrip('/')
         message = DiagnosticArray(header=header(self._node.clock_ns()))
-        for task, check in self._tasks.items():
-            found = check()
+        tasks = dict(self._tasks) or {'lifecycle': lambda: Health(Level.OK, 'works')}
+        for task, check in tasks.items():
+            found = Health(Level.WARN, self.inactive) if self.inactive else check()
             message.status.append(
                 DiagnosticStatus(
                     level=_LEVELS[found.level],
@@ -80,9 +89,9 @@ class Diagnostics:
         self._out.publish(message)
 
 
-def several_publishers(node: PeaceNode, topics: Iterable[str]) -> str:
-    """Return which of the topics has more than one publisher; empty when none has."""
-    for topic in topics:
+def several_publishers(node: PeaceNode) -> str:
+    """Return which topic of a landing has more than one publisher; empty when none has."""
+    for topic in _ONE_SOURCE:
         name = node.resolve_topic_name(topic)
         if (count := node.count_publishers(name)) > 1:
             return too_many(name, count)

@@ -12,7 +12,7 @@ from typing import Any
 
 from rclpy.clock import Clock, ClockType
 
-from peace_ros.core.domain import ConfigurationError, Health, Setpoint, VehicleError
+from peace_ros.core.domain import ConfigurationError, Health, Setpoint
 from peace_ros.core.landing import (
     SILENT_STATES,
     Decision,
@@ -24,21 +24,22 @@ from peace_ros.core.landing import (
 )
 from peace_ros.core.mapping import MapParameters
 from peace_ros.core.node_parameters import CameraOptions, LandingOptions, groups_of
-from peace_ros.core.vehicle import SenderParameters, SetpointSender, VehicleParameters
+from peace_ros.core.vehicle import VehicleParameters
 from peace_ros.nodes.diagnostics import several_publishers
 from peace_ros.nodes.engagement import EngagementServices
 from peace_ros.nodes.inputs import LandingInputs
-from peace_ros.nodes.node import PeaceNode
+from peace_ros.nodes.managed import ManagedNode
 from peace_ros.nodes.runtime import run
+from peace_ros.nodes.sending import Sending
 from peace_ros.nodes.status import DecisionPublisher, VehicleSituation
 from peace_ros.nodes.vehicle_access import VehicleAccess
 
-_ONE_SOURCE = ('image', 'image/compressed', 'prompt', 'heatmap', 'landing/status')
-"""Topics with one publisher at most; two of ``landing/status`` are two landing nodes."""
 
+class LandingNode(ManagedNode):
+    """Steps the landing core on the steady clock and hands its set-points to the timed sender.
 
-class LandingNode(PeaceNode):
-    """Steps the landing core on the steady clock and hands its set-points to the timed sender."""
+    It does so in the state inactive, too, and reports; only an active node engages.
+    """
 
     def __init__(self, **options: Any) -> None:
         """Subscribe, and begin to reach the vehicle.
@@ -48,13 +49,16 @@ class LandingNode(PeaceNode):
 
         """
         super().__init__('landing', *groups_of('landing'), **options)
+        self._lock = threading.RLock()
+        """Guards the core: the engage service runs beside the timer."""
+        self._sending = Sending(self)
+        self.start()
+
+    def configure(self) -> None:
+        """Subscribe, and begin to reach the vehicle."""
         self._options = self.filled(LandingOptions)
         self._landing = self.filled(LandingParameters)
         self._core = self._create_core()
-        self._lock = threading.RLock()
-        """Guards the core: the engage service runs beside the timer."""
-        self._sender: SetpointSender | None = None
-        self._closed = False
         self._state = State.IDLE
         self._publisher = DecisionPublisher(self)
         self._access = VehicleAccess(self, self._options, self.filled(VehicleParameters))
@@ -66,6 +70,10 @@ class LandingNode(PeaceNode):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0 / self._options.rate, self._step, clock=self._steady)
         self.get_logger().info(f'waiting for the vehicle: {self._access.name}')
+
+    def deactivate(self) -> None:
+        """Stop the vehicle and engage no more."""
+        self.end_landing()
 
     def _create_core(self) -> LandingCore:
         camera, mapping = self.filled(CameraOptions).camera, self.filled(MapParameters)
@@ -95,7 +103,7 @@ class LandingNode(PeaceNode):
             told, age_s = self._access.telemetry()
             decision = self._core.step(at_ns, told, age_s)
             self._submit(decision)
-        sender = '' if self._sender is None else self._sender.statistics().state.value
+        sender = self._sending.state
         situation = VehicleSituation(told, age_s, self._access.problem, sender, link)
         self._publisher.publish(decision, situation, at_ns)
         self._access.follow(decision)
@@ -104,17 +112,13 @@ class LandingNode(PeaceNode):
     def _submit(self, decision: Decision) -> None:
         if decision.state is not self._state:
             self.get_logger().info(f'{decision.state.value}: {decision.reason}')
-            if decision.state is State.ABORTED and self._sender is not None:
-                self._sender.resume()  # forgets the last set-point; nothing is sent any more
+            if decision.state is State.ABORTED:
+                self._sending.forget()
             self._state = decision.state
         if decision.relaxed:
             self.say('relaxation', f'threshold relaxed to {decision.effective_threshold:.2f}')
-        if self._sender is None or decision.state in SILENT_STATES:
-            return
-        try:
-            self._sender.submit(decision.setpoint)
-        except VehicleError as error:
-            self.say('sender', str(error))
+        if decision.state not in SILENT_STATES:
+            self._sending.submit(decision.setpoint)
 
     def check_engagement(self) -> str:
         """Return why a landing cannot begin now, empty when it can."""
@@ -123,29 +127,25 @@ class LandingNode(PeaceNode):
             stamp_ns = self._core.safety_map.stamp_ns
             map_age_s = inf if stamp_ns is None else (self.clock_ns() - stamp_ns) / 1e9
             return (
-                several_publishers(self, _ONE_SOURCE)
+                self.diagnostics.inactive
+                or several_publishers(self)
                 or self._access.vehicle_problem
                 or engagement_problem(self._state, told, age_s, map_age_s, self._landing)
             )
 
     def _readiness(self) -> Health:
-        several = several_publishers(self, _ONE_SOURCE)
+        several = several_publishers(self)
         return readiness(self._state, several, self.check_engagement())
 
     def begin(self) -> str:
         """Begin the landing of a vehicle that obeys; return what speaks against it, or nothing."""
         with self._lock:
             link = self._access.link
-            if self._closed or self.failure is not None:
-                return 'the node is ending'
+            if not self.is_active or self.failure is not None:
+                return 'the landing node is not active'
             if link is None:
                 return self._access.problem or 'the vehicle is not reached yet'
-            if self._sender is None:
-                self._sender = SetpointSender(
-                    link, parameters=self.filled(SenderParameters), on_defect=self.fail
-                )
-                self._sender.start()
-            self._sender.resume()
+            self._sending.begin(link)
             self._core.engage()
         return ''
 
@@ -154,35 +154,35 @@ class LandingNode(PeaceNode):
         with self._lock:
             was_flying = self._state not in SILENT_STATES
             self._core.disengage()
-            if was_flying and self._sender is not None:
+            if was_flying:
                 # Zero goes out, then the dead-man asks for the autopilot's own hold mode.
-                self._sender.submit(Setpoint(stamp_ns=0))
+                self._sending.submit(Setpoint(stamp_ns=0))
         return was_flying
 
-    def close(self) -> None:
-        """Stop the vehicle: zero velocity, then no further set-point."""
+    def cleanup(self) -> None:
+        """Stop the vehicle: zero velocity, then no further set-point; release the connection."""
         with self._lock:
-            self._closed = True
-            if self._sender is not None:
-                self._sender.stop()
+            if self._sending.stop():
                 self._access.stop_vehicle()
-        self._access.close()
-        self._engagement.close()
+        if '_access' in vars(self):
+            self._access.close()
+        if '_engagement' in vars(self):
+            self._engagement.close()
 
     def watch(self) -> None:
         """Raise when the thread of the sender does not run."""
-        if self._sender is not None:
-            self._sender.watch()
+        self._sending.watch()
 
     def last_steps(self, sentence: str) -> tuple[Callable[[], None], ...]:
         """Stop the vehicle, and publish why."""
+        if not self.is_configured:
+            return ()
         return self._stop_at_once, lambda: self._publisher.publish_failure(
             sentence, self.clock_ns()
         )
 
     def _stop_at_once(self) -> None:
-        if self._sender is not None:
-            self._sender.halt()
+        self._sending.halt()
         if self._state not in SILENT_STATES:
             self._access.stop_at_once()
 

@@ -35,6 +35,9 @@ _WATCH_S = 0.1
 class PeaceNode(Node):  # type: ignore[misc]
     """A node with dataclasses as parameters, which limits how often it repeats a warning."""
 
+    is_configured = True
+    """Its parameters are in use."""
+
     def __init__(self, name: str, *groups: Group, **options: Any) -> None:
         """Create the node; refuse parameters that none of the dataclasses declares.
 
@@ -72,7 +75,7 @@ class PeaceNode(Node):  # type: ignore[misc]
         values = {each.name: each.value for each in given}
         try:
             changed = changed_parameters(self._filled, self._groups, values)
-            if changed:
+            if changed and self.is_configured:
                 self.change({**self._filled, **changed})
         except PeaceError as error:
             return SetParametersResult(successful=False, reason=str(error))
@@ -134,16 +137,40 @@ class PeaceNode(Node):  # type: ignore[misc]
         """Let :meth:`wait_until_ended` return; from any thread or signal handler."""
         self._endings.put(None)
 
-    def wait_until_ended(self) -> None:
-        """Block until the node shall end; a node that has failed ends the process from here."""
+    def wait_until_ended(self, *others: PeaceNode) -> None:
+        """Block until the node shall end; a node that has failed ends the process from here.
+
+        Args:
+            others: of this process; when one of them ends, all do.
+
+        """
+        nodes = (self, *others)
+        for each in others:
+            each.share_end(self._endings)
         while self._endings.empty():
             with suppress(Empty):
                 self._endings.get(timeout=_WATCH_S)
                 break
-            try:
-                self.watch()
-            except Exception as error:
-                self.fail(error)
+            for each in nodes:
+                each.fail_where_watched()
+        for each in nodes:
+            each.end_if_failed()
+
+    def fail_where_watched(self) -> None:
+        """Fail when :meth:`watch` raises."""
+        try:
+            self.watch()
+        except Exception as error:
+            self.fail(error)
+
+    def share_end(self, endings: SimpleQueue[None]) -> None:
+        """End together with the node whose endings these are."""
+        self._endings = endings
+        if self.failure is not None:
+            self.end()
+
+    def end_if_failed(self) -> None:
+        """End the process when this node has failed; the last steps are waited for."""
         if self.failure is not None:
             self._failure.end_process()
 

@@ -31,8 +31,10 @@ def _interrupt(_number: int, _frame: FrameType | None) -> None:
     raise _Interrupted
 
 
-def run(create: Callable[[], PeaceNode], args: Sequence[str] | None = None) -> int:
-    """Create a node, spin it until SIGINT or SIGTERM, close it; return the exit status.
+def run(
+    create: Callable[[], PeaceNode | Sequence[PeaceNode]], args: Sequence[str] | None = None
+) -> int:
+    """Create nodes, spin them until SIGINT or SIGTERM, close them; return the exit status.
 
     0 after a signal; 2 with one sentence on standard error when the arguments, the
     configuration, a model, a world or the vehicle cannot be used. A defect ends the process with
@@ -42,15 +44,16 @@ def run(create: Callable[[], PeaceNode], args: Sequence[str] | None = None) -> i
     """
     for number in _SIGNALS:
         signal.signal(number, _interrupt)
-    node: PeaceNode | None = None
+    nodes: Sequence[PeaceNode] = ()
     try:
         rclpy.init(
             args=None if args is None else list(args),
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        node = create()
-        _end_on_signals(node)
-        spin_until_ended(node)
+        created = create()
+        nodes = (created,) if isinstance(created, PeaceNode) else created
+        _end_on_signals(nodes[0])
+        spin_until_ended(*nodes)
     except _Interrupted:
         # A node that is not complete can be neither used nor destroyed, and the threads of its
         # middleware would abort an ordinary exit.
@@ -64,10 +67,10 @@ def run(create: Callable[[], PeaceNode], args: Sequence[str] | None = None) -> i
     finally:
         for number in _SIGNALS:
             signal.signal(number, signal.SIG_IGN)
-        if node is not None:
+        for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
-    return EXIT_OK if node.failure is None else EXIT_FAILED
+    return EXIT_FAILED if any(node.failure for node in nodes) else EXIT_OK
 
 
 def _end_on_signals(node: PeaceNode) -> None:

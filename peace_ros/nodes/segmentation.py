@@ -9,12 +9,11 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CompressedImage, Image
 
 from peace_ros.core.domain import Frame, Health, Heatmap, Level, PeaceError, Prompt
 from peace_ros.core.health import WorkHealth
-from peace_ros.core.messages import frame_from_message, prompt_from_message, stamp_ns_of
+from peace_ros.core.messages import frame_from_message, stamp_ns_of
 from peace_ros.core.node_parameters import SegmentationOptions, groups_of
 from peace_ros.core.pipeline import Pipeline
 from peace_ros.core.segmentation import (
@@ -26,11 +25,12 @@ from peace_ros.core.segmentation import (
     load_terms,
 )
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
+from peace_ros.nodes.managed import ManagedNode
 from peace_ros.nodes.messages import heatmap_to_image, jpeg_message
-from peace_ros.nodes.node import PeaceNode
-from peace_ros.nodes.prompts import PromptBoard, prompt_of_another_frame, static_prompt
-from peace_ros.nodes.qos import IMAGE_OUT, RESULT
+from peace_ros.nodes.prompts import PromptInput, prompt_of_another_frame, static_prompt
+from peace_ros.nodes.qos import IMAGE_OUT
 from peace_ros.nodes.runtime import run
+from peace_ros.nodes.sharing import SharedImages
 from peace_ros.nodes.worker import NewestWorker
 
 _NAME = 'segmentation'
@@ -38,14 +38,20 @@ _SLOW_S = 1.0
 """Work for one frame that leaves little of the age that the landing allows a heatmap."""
 
 
-class SegmentationNode(PeaceNode):
+class SegmentationNode(ManagedNode):
     """Scores the newest frame with the prompt that was made from it."""
 
-    def __init__(self, segmenter: Segmenter | None = None, **options: Any) -> None:
+    def __init__(
+        self,
+        segmenter: Segmenter | None = None,
+        images: SharedImages | None = None,
+        **options: Any,
+    ) -> None:
         """Load the model and subscribe.
 
         Args:
             segmenter: in place of the one that the parameters describe.
+            images: gets the images for the other nodes of this process, too.
             options: of rclpy's Node.
 
         Raises:
@@ -53,25 +59,41 @@ class SegmentationNode(PeaceNode):
 
         """
         super().__init__(_NAME, *groups_of(_NAME), **options)
+        self._given = segmenter
+        self._images = images or SharedImages()
+        self.start()
+
+    def configure(self) -> None:
+        """Load the model and subscribe."""
         self._options = self.filled(SegmentationOptions)
-        self._static = static_prompt(self._options)
-        self._pipeline = Pipeline(segmenter or self._create_segmenter())
-        self._board = PromptBoard()
-        self._prepared: set[str] = set()
+        self._pipeline = Pipeline(self._given or self._create_segmenter())
         self._heatmap_out = self.create_publisher(Image, 'heatmap', IMAGE_OUT)
         self._overlay_out = self.create_publisher(CompressedImage, 'overlay/compressed', IMAGE_OUT)
         self._image_arrived = self.diagnostics.watch('image')
         self._work = WorkHealth()
         self.diagnostics.add('heatmaps', self._work.take)
-        self._preparer = NewestWorker(self._prepare, self._complain, self.fail, 'prepare')
-        self._worker = NewestWorker(self._segment, self._complain, self.fail, _NAME)
-        self._prompt_arrived = self.diagnostics.watch(
-            'prompt', unless=lambda: '' if self._static is None else 'not used: static template'
-        )
-        self.create_subscription(DiagnosticArray, 'prompt', self._on_prompt, RESULT)
-        subscribe_images(self, self._options.image_transport, self._on_image)
-        waits = 'waits for prompts' if self._static is None else 'static'
+        self._prompts = PromptInput(self, self._options, self._embed, self._complain)
+        subscribe_images(self, self._options.image_transport, self._images.offer)
+        waits = 'waits for prompts' if self._prompts.static is None else 'static'
         self.get_logger().info(f'ready: template {self._options.template!r} ({waits})')
+
+    def activate(self) -> None:
+        """Begin to score frames."""
+        self._worker = NewestWorker(self._segment, self._complain, self.fail, _NAME)
+        self._images.add(self._on_image)
+
+    def deactivate(self) -> None:
+        """Score no further frame."""
+        self._images.remove(self._on_image)
+        self._worker.close()
+
+    def cleanup(self) -> None:
+        """Free the model."""
+        if '_prompts' in vars(self):
+            self._prompts.close()
+            del self._prompts
+        if '_pipeline' in vars(self):
+            del self._pipeline
 
     def _create_segmenter(self) -> Segmenter:
         parameters = self.filled(SegmentationParameters)
@@ -87,14 +109,15 @@ class SegmentationNode(PeaceNode):
             segmenter = segmenter.with_terms(load_terms(terms))
         if static is not None:
             segmenter.prepare(static)
-        self._options, self._static = options, static
-        if segmenter is not self._pipeline.segmenter:
-            self._pipeline.segmenter = segmenter
-            self._prepared.clear()
+        self._options, self._pipeline.segmenter = options, segmenter
+        self._prompts.change(options)
+
+    def _embed(self, prompt: Prompt) -> None:
+        self._pipeline.segmenter.prepare(prompt)
 
     def _on_image(self, message: ImageMessage) -> None:
         self._image_arrived(stamp_ns_of(message))
-        if self._static is None and self._board.is_empty:
+        if self._prompts.is_empty:
             self.say(
                 'waiting',
                 'no prompt has arrived yet, but frames have: is prompt_generator running?',
@@ -102,40 +125,13 @@ class SegmentationNode(PeaceNode):
             return
         self._worker.offer(message)
 
-    def _on_prompt(self, message: DiagnosticArray) -> None:
-        self._prompt_arrived(stamp_ns_of(message))
-        if self._static is not None:
-            return
-        try:
-            prompt = prompt_from_message(message)
-        except PeaceError as error:
-            self._complain(error)
-            return
-        # A new sentence is embedded in another thread; frames use the last one until then.
-        if prompt.template in self._prepared:
-            self._board.put(prompt)
-        else:
-            self._preparer.offer(prompt)
-
-    def _prepare(self, prompt: Prompt) -> None:
-        self._pipeline.segmenter.prepare(prompt)
-        self._prepared.add(prompt.template)
-        self._board.put(prompt)
-
-    def _prompt_for(self, at_ns: int) -> tuple[Prompt, bool] | None:
-        """Return the prompt for a frame and whether it was made from that frame."""
-        if self._static is not None:
-            return self._static, True
-        prompt = self._board.take(at_ns, self._options.prompt_timeout)
-        return None if prompt is None else (prompt, prompt.stamp_ns == at_ns)
-
     def _segment(self, message: ImageMessage) -> None:
-        chosen = self._prompt_for(stamp_ns_of(message))
+        chosen = self._prompts.take(stamp_ns_of(message))
         if chosen is None:
             return
         prompt, own = chosen
         began = time.monotonic()
-        frame = frame_from_message(message)
+        frame = self._images.frame(message, frame_from_message)
         heatmap = self._pipeline.heatmap(frame, prompt)
         self._heatmap_out.publish(heatmap_to_image(heatmap, message.header.frame_id))
         work_s = time.monotonic() - began
@@ -174,12 +170,6 @@ class SegmentationNode(PeaceNode):
     def _complain(self, error: PeaceError) -> None:
         self.say(type(error).__name__, f'no heatmap: {error}')
         self._work.put(Health(Level.ERROR, str(error)))
-
-    def close(self) -> None:
-        """Stop the workers."""
-        self._board.close()
-        self._preparer.close()
-        self._worker.close()
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -98,7 +98,7 @@ def test_by_default_the_preset_decides_and_nothing_goes_before_it(launch):
     for node in launch().values():
         path, given = node['parameters']
         assert path == str(config_dir() / 'presets' / 'peace_cs.yaml')
-        assert given == {'use_sim_time': False}
+        assert given == {'use_sim_time': False, 'autostart': True}
 
 
 def test_a_parameter_file_goes_before_the_preset_and_an_argument_before_both(launch, tmp_path):
@@ -127,12 +127,21 @@ def test_every_argument_changes_what_is_started(launch, tmp_path):
         'params_file': str(path),
         'use_sim_time': 'true',
         'log_level': 'debug',
+        'autostart': 'false',
+        'use_composition': 'true',
         'use_respawn': 'true',
         'discovery_range': 'SUBNET',
     }
     usual = launch()
     for name, *_ in load().ARGUMENTS:
         assert launch(f'{name}:={others.get(name, "other")}') != usual, name
+
+
+def test_composed_perception_is_one_process_whose_nodes_keep_their_names(launch):
+    nodes = launch('use_composition:=true')
+    assert list(nodes) == ['perception', 'landing']
+    assert nodes['perception']['name'] is None
+    assert nodes['perception']['parameters'] == launch()['segmentation']['parameters']
 
 
 def test_a_landing_that_ended_is_not_started_again(launch):
@@ -199,6 +208,12 @@ class TestWithLaunch:
             assert '-r image:=/camera/image_raw' in line
             assert '-r image/compressed:=/camera/image_raw/compressed' in line
             assert '--log-level warn' in line
+
+    def test_a_composed_process_gets_no_name(self, launch):
+        _, printed = launch('use_composition:=true', 'namespace:=drone_1')
+        (line, _) = [line for line in printed.splitlines() if '--ros-args' in line]
+        assert '__ns:=/drone_1' in line
+        assert '__node' not in line
 
     def test_a_preset_that_is_none_is_refused_with_those_that_are(self, launch):
         status, printed = launch('preset:=peace')
