@@ -130,6 +130,9 @@ class LandingOptions(ParameterSet):
     )
     tf_parent: str = parameter('map', 'Local frame (ENU) of the pose in tf')
     tf_child: str = parameter('base_link', 'Frame of the vehicle in tf')
+    publish_tf: bool = parameter(
+        False, 'Publish tf_parent -> tf_child, where nothing else does (needs tf2_msgs)'
+    )
 
 
 def groups_of(node: str) -> tuple[Group, ...]:

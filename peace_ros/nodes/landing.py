@@ -33,6 +33,7 @@ from peace_ros.nodes.runtime import run
 from peace_ros.nodes.sending import Sending
 from peace_ros.nodes.status import DecisionPublisher, VehicleSituation
 from peace_ros.nodes.vehicle_access import VehicleAccess
+from peace_ros.nodes.view import LandingView
 
 
 class LandingNode(ManagedNode):
@@ -62,6 +63,7 @@ class LandingNode(ManagedNode):
         self._state = State.IDLE
         self._publisher = DecisionPublisher(self)
         self._access = VehicleAccess(self, self._options, self.filled(VehicleParameters))
+        self._view = LandingView(self, self._options)
         self._inputs = LandingInputs(self, self._options)
         self.diagnostics.hardware_id = self._access.name
         self.diagnostics.add('landing', self._readiness)
@@ -106,6 +108,7 @@ class LandingNode(ManagedNode):
         sender = self._sending.state
         situation = VehicleSituation(told, age_s, self._access.problem, sender, link)
         self._publisher.publish(decision, situation, at_ns)
+        self._view.show(at_ns, decision, told, self._core)
         self._access.follow(decision)
         self._engagement.engage_when_ready()
 

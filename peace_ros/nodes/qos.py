@@ -8,7 +8,7 @@ best-effort images larger than its shared-memory segment (about 549 kB); ``confi
 enlarges the segment of the process that publishes them.
 """
 
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 # A profile with a depth is keep-last, reliable and volatile where it does not say otherwise.
 
@@ -29,6 +29,9 @@ RESULT = QoSProfile(depth=10)
 
 COMMAND = QoSProfile(depth=1)
 """Velocity commands: only the newest has a meaning."""
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Maps: who comes late gets the last one."""
 
 CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """/clock, as rclpy subscribes to it."""

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, Pose, Telemetry
+from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, Pose, Site, Telemetry
 from peace_ros.core.landing.decision import Decision
 from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.intake import HeatmapIntake
 from peace_ros.core.landing.lookout import Lookout
+from peace_ros.core.landing.memory import FailedPlace
 from peace_ros.core.landing.parameters import LandingParameters
 from peace_ros.core.landing.states import State
 from peace_ros.core.landing.watch import valid_pose
@@ -47,6 +48,16 @@ class LandingCore:
     def state(self) -> State:
         """The state that the last step ended in."""
         return self._helm.state
+
+    @property
+    def failed_places(self) -> tuple[FailedPlace, ...]:
+        """Circles in which no site is chosen now."""
+        return self._lookout.memory.failed
+
+    @property
+    def seen_sites(self) -> tuple[Site, ...]:
+        """Every other site that was seen, as it was seen last."""
+        return self._lookout.memory.seen
 
     def add_pose(self, pose: Pose) -> None:
         """Keep a pose for the heatmaps around its stamp; in the order of stamps."""
