@@ -22,7 +22,13 @@ LEFT_OUT = [f'{NAME}.lab.training', f'{NAME}.lab.training.*']
 DATA_LEFT_OUT = ['ament/*', 'annotations/*']
 
 # ROS looks for launch files and what they name under share/, for nothing else.
-SHARED = ('config/*.yaml', 'config/*.xml', 'config/presets/*.yaml', 'config/rviz/*.rviz')
+SHARED = (
+    'config/*.yaml',
+    'config/*.xml',
+    'config/presets/*.yaml',
+    'config/rviz/*.rviz',
+    'config/sros2/*.xml',
+)
 
 NODES = (
     'prompt_generator',
