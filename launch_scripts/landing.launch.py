@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from difflib import get_close_matches
 from pathlib import Path
@@ -24,6 +25,7 @@ PACKAGE = 'peace_ros'
 PRESETS = sorted(path.stem for path in (config_dir() / 'presets').glob('*.yaml'))
 DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 COMPOSED, SEPARATE = 'perception', ('prompt_generator', 'segmentation')
+FAST_DDS = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 RESPAWN_DELAY_S = 2.0
 BOOLEANS = ['true', 'false']
 
@@ -121,7 +123,10 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
             ros_arguments=['--log-level', given['log_level']],
             respawn=respawn,
             respawn_delay=RESPAWN_DELAY_S,
-            additional_env={DISCOVERY: given['discovery_range']},
+            additional_env={
+                DISCOVERY: given['discovery_range'],
+                FAST_DDS: os.environ.get(FAST_DDS) or str(config_dir() / 'fastdds.xml'),
+            },
         )
 
     respawn = given['use_respawn'] == 'true'

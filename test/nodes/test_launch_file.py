@@ -151,7 +151,15 @@ def test_a_landing_that_ended_is_not_started_again(launch):
 
 def test_discovery_stays_on_the_machine(launch):
     for node in launch().values():
-        assert node['additional_env'] == {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+        assert node['additional_env']['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+
+
+def test_a_profile_of_fast_dds_that_is_set_is_kept(launch, monkeypatch):
+    name = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+    monkeypatch.delenv(name, raising=False)
+    assert launch()['landing']['additional_env'][name] == str(config_dir() / 'fastdds.xml')
+    monkeypatch.setenv(name, '/mine.xml')
+    assert launch()['landing']['additional_env'][name] == '/mine.xml'
 
 
 @pytest.mark.parametrize(
