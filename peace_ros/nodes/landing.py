@@ -25,6 +25,7 @@ from peace_ros.core.landing import (
 from peace_ros.core.mapping import MapParameters
 from peace_ros.core.node_parameters import CameraOptions, LandingOptions, groups_of
 from peace_ros.core.vehicle import VehicleParameters
+from peace_ros.nodes.connection import newest_telemetry
 from peace_ros.nodes.diagnostics import several_publishers
 from peace_ros.nodes.engagement import EngagementServices
 from peace_ros.nodes.inputs import LandingInputs
@@ -58,9 +59,8 @@ class LandingNode(ManagedNode):
     def configure(self) -> None:
         """Subscribe, and begin to reach the vehicle."""
         self._options = self.filled(LandingOptions)
-        self._landing = self.filled(LandingParameters)
+        self._landing, self._state = self.filled(LandingParameters), State.IDLE
         self._core = self._create_core()
-        self._state = State.IDLE
         self._publisher = DecisionPublisher(self)
         self._access = VehicleAccess(self, self._options, self.filled(VehicleParameters))
         self._view = LandingView(self, self._options)
@@ -69,8 +69,8 @@ class LandingNode(ManagedNode):
         self.diagnostics.add('landing', self._readiness)
         self._engagement = EngagementServices(self, self._access, auto=self._options.auto_engage)
         # A ROS-time timer would stand still with a clock that stops or jumps.
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(1.0 / self._options.rate, self._step, clock=self._steady)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1.0 / self._options.rate, self._step, clock=steady)
         self.get_logger().info(f'waiting for the vehicle: {self._access.name}')
 
     def deactivate(self) -> None:
@@ -102,14 +102,14 @@ class LandingNode(ManagedNode):
             for pose in () if link is None else link.take_poses():
                 self._core.add_pose(pose)
             self._inputs.feed(self._core)
-            told, age_s = self._access.telemetry()
+            told, age_s = newest_telemetry(link)
             decision = self._core.step(at_ns, told, age_s)
             self._submit(decision)
-        sender = self._sending.state
-        situation = VehicleSituation(told, age_s, self._access.problem, sender, link)
+        access, sender = self._access, self._sending.state
+        situation = VehicleSituation(told, age_s, access.problem, sender, access.stage, link)
         self._publisher.publish(decision, situation, at_ns)
         self._view.show(at_ns, decision, told, self._core)
-        self._access.follow(decision)
+        access.follow(decision)
         self._engagement.engage_when_ready()
 
     def _submit(self, decision: Decision) -> None:
@@ -125,7 +125,7 @@ class LandingNode(ManagedNode):
 
     def check_engagement(self) -> str:
         """Return why a landing cannot begin now, empty when it can."""
-        told, age_s = self._access.telemetry()
+        told, age_s = newest_telemetry(self._access.link)
         with self._lock:
             stamp_ns = self._core.safety_map.stamp_ns
             map_age_s = inf if stamp_ns is None else (self.clock_ns() - stamp_ns) / 1e9

@@ -7,13 +7,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
-from math import inf
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, Twist
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.core.domain import ConfigurationError, Pose, Setpoint, Telemetry, VehicleError
+from peace_ros.core.domain import ConfigurationError, Pose, Setpoint, VehicleError
 from peace_ros.core.landing import Decision, State
 from peace_ros.core.messages import pose_from_message, pose_from_transform
 from peace_ros.core.node_parameters import LandingOptions
@@ -96,13 +95,10 @@ class VehicleAccess:
             return self.problem
         return link.problem or link.position_problem
 
-    def telemetry(self) -> tuple[Telemetry | None, float]:
-        """Return what the vehicle last said and how old (s) it is; None and infinite before."""
-        link = self.link
-        told = None if link is None else link.telemetry()
-        if told is None or told.received_ns == 0:
-            return None, inf
-        return told, (time.monotonic_ns() - told.received_ns) / 1e9
+    @property
+    def stage(self) -> str:
+        """What the vehicle does since the hand-over, empty before it."""
+        return self._after.stage
 
     def follow(self, decision: Decision) -> None:
         """Report our health to the vehicle, and do what follows a hand-over; once per step."""
@@ -140,7 +136,10 @@ class VehicleAccess:
     def stop_vehicle(self) -> None:
         """Send zero velocity, if the vehicle still obeys us."""
         link = self.link
-        if link is None or link.taken_over or not link.telemetry().in_control:
+        if link is None or link.taken_over:
+            return
+        told = link.telemetry()
+        if not (told.in_control and told.mode_known):
             return
         try:
             for _ in range(_LAST_ZEROS):
