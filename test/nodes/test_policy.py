@@ -46,12 +46,14 @@ def names(pairs: list[tuple[str, list[str]]]) -> set[str]:
 def test_a_node_may_do_all_that_it_does(bench, name, landing_options):
     options = landing_options if name == 'landing' else {}
     node = bench.run(NODES[name], *([] if name == 'landing' else [Model()]), **options)
-    graph = bench.peer
-    bench.until(lambda: name in graph.get_node_names())
-    published = names(node.get_publisher_names_and_types_by_node(name, '/'))
+
+    def published_now() -> set[str]:
+        return names(node.get_publisher_names_and_types_by_node(name, '/'))
+
+    bench.until(lambda: {'/diagnostics', '/rosout'} <= published_now())
+    published = published_now()
     subscribed = names(node.get_subscriber_names_and_types_by_node(name, '/'))
     served = names(node.get_service_names_and_types_by_node(name, '/'))
-    assert {'/diagnostics', '/rosout'} <= published
     assert published <= allowed(name, name, 'topics', 'publish')
     assert subscribed <= allowed(name, name, 'topics', 'subscribe')
     assert served <= allowed(name, name, 'services', 'reply')
