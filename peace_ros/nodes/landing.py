@@ -7,7 +7,6 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from math import inf
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
@@ -78,8 +77,9 @@ class LandingNode(ManagedNode):
         self.end_landing()
 
     def _create_core(self) -> LandingCore:
-        camera, mapping = self.filled(CameraOptions).camera, self.filled(MapParameters)
-        return LandingCore(self._landing, camera, mapping)
+        camera = self.filled(CameraOptions)
+        mount = None if self._options.mount_source == 'tf' else camera.mount
+        return LandingCore(self._landing, camera.camera, self.filled(MapParameters), mount)
 
     def change(self, filled: Mapping[type[Any], Any]) -> None:
         """Begin a new map with other thresholds; only while no landing is under way."""
@@ -127,18 +127,18 @@ class LandingNode(ManagedNode):
         """Return why a landing cannot begin now, empty when it can."""
         told, age_s = newest_telemetry(self._access.link)
         with self._lock:
-            stamp_ns = self._core.safety_map.stamp_ns
-            map_age_s = inf if stamp_ns is None else (self.clock_ns() - stamp_ns) / 1e9
+            map_age_s = self._core.map_age_s(self.clock_ns())
             return (
                 self.diagnostics.inactive
                 or several_publishers(self)
                 or self._access.vehicle_problem
-                or engagement_problem(self._state, told, age_s, map_age_s, self._landing)
+                or engagement_problem(
+                    self._state, told, age_s, map_age_s, self._landing, self._core.last_rejection
+                )
             )
 
     def _readiness(self) -> Health:
-        several = several_publishers(self)
-        return readiness(self._state, several, self.check_engagement())
+        return readiness(self._state, several_publishers(self), self.check_engagement())
 
     def begin(self) -> str:
         """Begin the landing of a vehicle that obeys; return what speaks against it, or nothing."""
@@ -167,10 +167,9 @@ class LandingNode(ManagedNode):
         with self._lock:
             if self._sending.stop():
                 self._access.stop_vehicle()
-        if '_access' in vars(self):
-            self._access.close()
-        if '_engagement' in vars(self):
-            self._engagement.close()
+        for each in ('_access', '_engagement'):
+            if each in vars(self):
+                vars(self)[each].close()
 
     def watch(self) -> None:
         """Raise when the thread of the sender does not run."""

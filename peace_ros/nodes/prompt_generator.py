@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from peace_ros.core.domain import Health, Level, PeaceError
 from peace_ros.core.health import WorkHealth
-from peace_ros.core.messages import frame_from_message, stamp_ns_of
+from peace_ros.core.messages import stamp_ns_of
 from peace_ros.core.node_parameters import PromptGeneratorOptions, groups_of
 from peace_ros.core.pipeline import create_generator
 from peace_ros.core.prompting import PromptGenerator, PromptingParameters, resolve_template
@@ -93,7 +93,7 @@ class PromptGeneratorNode(ManagedNode):
 
     def _generate(self, message: ImageMessage) -> None:
         began = time.monotonic()
-        prompt = self._generator.generate(self._images.frame(message, frame_from_message))
+        prompt = self._generator.generate(self._images.frame(message))
         self._prompt_out.publish(prompt_to_message(prompt))
         if prompt.template != self._last_template:
             self._last_template = prompt.template

@@ -9,11 +9,11 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from peace_ros.core.domain import Frame, Health, Heatmap, Level, PeaceError, Prompt
 from peace_ros.core.health import WorkHealth
-from peace_ros.core.messages import frame_from_message, stamp_ns_of
+from peace_ros.core.messages import stamp_ns_of
 from peace_ros.core.node_parameters import SegmentationOptions, groups_of
 from peace_ros.core.pipeline import Pipeline
 from peace_ros.core.segmentation import (
@@ -24,11 +24,11 @@ from peace_ros.core.segmentation import (
     family_of,
     load_terms,
 )
-from peace_ros.nodes.inputs import ImageMessage, subscribe_images
+from peace_ros.nodes.inputs import FRAME_INFO, CalibratedImages, ImageMessage
 from peace_ros.nodes.managed import ManagedNode
-from peace_ros.nodes.messages import heatmap_to_image, jpeg_message
+from peace_ros.nodes.messages import camera_info, heatmap_to_image, jpeg_message
 from peace_ros.nodes.prompts import PromptInput, prompt_of_another_frame, static_prompt
-from peace_ros.nodes.qos import IMAGE_OUT
+from peace_ros.nodes.qos import IMAGE_OUT, RESULT
 from peace_ros.nodes.runtime import run
 from peace_ros.nodes.sharing import SharedImages
 from peace_ros.nodes.worker import NewestWorker
@@ -68,12 +68,14 @@ class SegmentationNode(ManagedNode):
         self._options = self.filled(SegmentationOptions)
         self._pipeline = Pipeline(self._given or self._create_segmenter())
         self._heatmap_out = self.create_publisher(Image, 'heatmap', IMAGE_OUT)
+        self._frame_info_out = self.create_publisher(CameraInfo, FRAME_INFO, RESULT)
         self._overlay_out = self.create_publisher(CompressedImage, 'overlay/compressed', IMAGE_OUT)
         self._image_arrived = self.diagnostics.watch('image')
         self._work = WorkHealth()
         self.diagnostics.add('heatmaps', self._work.take)
         self._prompts = PromptInput(self, self._options, self._embed, self._complain)
-        subscribe_images(self, self._options.image_transport, self._images.offer)
+        calibrated = CalibratedImages(self, self._options.image_transport, self._images.offer)
+        self._images.decode = calibrated.frame
         waits = 'waits for prompts' if self._prompts.static is None else 'static'
         self.get_logger().info(f'ready: template {self._options.template!r} ({waits})')
 
@@ -131,18 +133,21 @@ class SegmentationNode(ManagedNode):
             return
         prompt, own = chosen
         began = time.monotonic()
-        frame = self._images.frame(message, frame_from_message)
+        frame, frame_id = self._images.frame(message), message.header.frame_id
         heatmap = self._pipeline.heatmap(frame, prompt)
-        self._heatmap_out.publish(heatmap_to_image(heatmap, message.header.frame_id))
+        self._frame_info_out.publish(
+            camera_info(frame.size_px, frame.camera, frame.stamp_ns, frame_id)
+        )
+        self._heatmap_out.publish(heatmap_to_image(heatmap, frame_id))
         work_s = time.monotonic() - began
         if self._overlay_out.get_subscription_count() > 0:
-            self._publish_overlay(frame, heatmap)
+            self._publish_overlay(frame, heatmap, frame_id)
         self._report(frame.stamp_ns, prompt, own=own, work_s=work_s)
 
-    def _publish_overlay(self, frame: Frame, heatmap: Heatmap) -> None:
+    def _publish_overlay(self, frame: Frame, heatmap: Heatmap, frame_id: str) -> None:
         overlay = draw_overlay(frame, heatmap, self._options.overlay_threshold)
         self._overlay_out.publish(
-            jpeg_message(overlay, frame.stamp_ns, self._options.overlay_quality)
+            jpeg_message(overlay, frame.stamp_ns, self._options.overlay_quality, frame_id)
         )
 
     def _report(self, at_ns: int, prompt: Prompt, *, own: bool, work_s: float) -> None:

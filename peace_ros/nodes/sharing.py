@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from peace_ros.core.domain import Frame
+from peace_ros.core.messages import frame_from_message
 
 _Take = Callable[[Any], None]
 
@@ -19,6 +20,8 @@ class SharedImages:
     def __init__(self) -> None:
         self._takers: list[_Take] = []
         self._lock = threading.Lock()
+        self.decode: Callable[[Any], Frame] = frame_from_message
+        """By whoever subscribes, who may know the camera."""
         self._decoded: tuple[Any, Frame] | None = None
 
     def add(self, take: _Take) -> None:
@@ -35,9 +38,9 @@ class SharedImages:
         for take in tuple(self._takers):
             take(message)
 
-    def frame(self, message: Any, decode: Callable[[Any], Frame]) -> Frame:
+    def frame(self, message: Any) -> Frame:
         """Return the frame of an image; the next one who asks for the same image gets it, too."""
         with self._lock:
             if self._decoded is None or self._decoded[0] is not message:
-                self._decoded = (message, decode(message))
+                self._decoded = (message, self.decode(message))
             return self._decoded[1]

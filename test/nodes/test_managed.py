@@ -18,7 +18,7 @@ from sensor_msgs.msg import Image
 from peace_ros.core.domain import Heatmap, Pose, Prompt
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
-from peace_ros.nodes.messages import heatmap_to_image, pose_to_message
+from peace_ros.nodes.messages import pose_to_message
 from peace_ros.nodes.prompt_generator import PromptGeneratorNode
 from peace_ros.nodes.segmentation import SegmentationNode
 
@@ -136,7 +136,7 @@ def test_a_landing_node_that_is_deactivated_stops_the_vehicle_and_engages_no_mor
     statuses = bench.heard(DiagnosticArray, 'landing/status', qos.RESULT)
     commands = bench.heard(Twist, 'cmd_vel', qos.COMMAND)
     node = bench.run(LandingNode, interface='twist')
-    heatmaps = bench.offer(Image, 'heatmap', qos.IMAGE_OUT)
+    heatmaps = bench.offer_heatmaps()
     poses = bench.offer(PoseStamped, 'pose', qos.POSE)
     manager = manager('landing')
     safety = np.full((32, 32), 0.97, np.float32)
@@ -144,7 +144,7 @@ def test_a_landing_node_that_is_deactivated_stops_the_vehicle_and_engages_no_mor
     def see() -> None:
         at_ns = node.clock_ns()
         poses.publish(pose_to_message(Pose(at_ns, 0.0, 0.0, -60.0, (1.0, 0.0, 0.0, 0.0), 60.0)))
-        heatmaps.publish(heatmap_to_image(Heatmap(safety, at_ns)))
+        heatmaps.publish(safety, at_ns)
 
     def moves() -> bool:
         v = commands[-1].linear if commands else Twist().linear

@@ -27,10 +27,11 @@ def test_an_image_is_decoded_once_for_all_who_take_it(frame):
         return frame
 
     def take(message):
-        got.append(images.frame(message, decode))
+        got.append(images.frame(message))
 
+    images.decode = decode
     images.add(take)
-    images.add(lambda message: got.append(images.frame(message, decode)))
+    images.add(lambda message: got.append(images.frame(message)))
     images.offer('first')
     assert (decoded, got) == (['first'], [frame, frame])
     images.remove(take)
@@ -45,9 +46,10 @@ def test_an_image_that_cannot_be_decoded_is_an_error_for_each(frame):
     def decode(message):
         raise ImageError('no')
 
+    images.decode = decode
     for _ in range(2):
         with pytest.raises(ImageError):
-            images.frame('broken', decode)
+            images.frame('broken')
 
 
 @pytest.fixture

@@ -9,13 +9,10 @@ from functools import partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from peace_ros.core.domain import Heatmap
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
-from peace_ros.nodes.messages import heatmap_to_image
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim, Mode
 
 CLIMB_M = 30.0
@@ -31,13 +28,13 @@ def test_each_landing_commands_its_own_vehicle(bench, values_of, take_off):
             statuses[drone] = bench.heard(DiagnosticArray, f'{drone}/landing/status', qos.RESULT)
             create = partial(LandingNode, namespace=f'/{drone}')
             node = bench.run(create, mavlink=sim.url, safe_altitude_m=20.5)
-            heatmaps[drone] = bench.offer(Image, f'{drone}/heatmap', qos.IMAGE_OUT)
+            heatmaps[drone] = bench.offer_heatmaps(drone)
             services[drone] = bench.peer.create_client(Trigger, f'/{drone}/landing/engage')
         safety = np.full((32, 32), 0.97, np.float32)
 
         def see() -> None:
             for publisher in heatmaps.values():
-                publisher.publish(heatmap_to_image(Heatmap(safety, node.clock_ns())))
+                publisher.publish(safety, node.clock_ns())
 
         def engage(drone: str) -> bool:
             future = services[drone].call_async(Trigger.Request())

@@ -8,8 +8,19 @@ Each step handles data, site, state, guidance and guard, in this order.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 
-from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, Pose, Site, Telemetry
+from peace_ros.core.domain import (
+    NADIR,
+    Camera,
+    DepthImage,
+    Frame,
+    Heatmap,
+    Mount,
+    Pose,
+    Site,
+    Telemetry,
+)
 from peace_ros.core.landing.decision import Decision
 from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.intake import HeatmapIntake
@@ -20,7 +31,8 @@ from peace_ros.core.landing.states import State
 from peace_ros.core.landing.watch import valid_pose
 from peace_ros.core.mapping import MapParameters, SafetyMap
 
-_JUMP_NS = 1_000_000_000
+_NANOSECONDS = 1_000_000_000
+_JUMP_NS = _NANOSECONDS
 """A clock that goes back by more than this was restarted."""
 
 
@@ -35,10 +47,19 @@ class LandingCore:
         parameters: LandingParameters,
         camera: Camera,
         map_parameters: MapParameters | None = None,
+        mount: Mount | None = NADIR,
     ) -> None:
+        """Begin in IDLE.
+
+        Args:
+            parameters: Of the landing.
+            camera: For frames that come without a calibration of their own.
+            map_parameters: Of the map.
+            mount: How the camera sits on the vehicle; None until :meth:`place_camera` says it.
+        """
         self.parameters = parameters
         self.safety_map = SafetyMap(map_parameters)
-        self._intake = HeatmapIntake(parameters, camera, self.safety_map)
+        self._intake = HeatmapIntake(parameters, camera, self.safety_map, mount)
         self._lookout = Lookout(parameters, self.safety_map)
         self._helm = Helm(parameters)
         self._last_ns: int | None = None
@@ -48,6 +69,11 @@ class LandingCore:
     def state(self) -> State:
         """The state that the last step ended in."""
         return self._helm.state
+
+    def map_age_s(self, now_ns: int) -> float:
+        """Return the age of the newest heatmap in the map, infinite without one."""
+        stamp_ns = self.safety_map.stamp_ns
+        return inf if stamp_ns is None else (now_ns - stamp_ns) / _NANOSECONDS
 
     @property
     def failed_places(self) -> tuple[FailedPlace, ...]:
@@ -59,6 +85,15 @@ class LandingCore:
         """Every other site that was seen, as it was seen last."""
         return self._lookout.memory.seen
 
+    @property
+    def last_rejection(self) -> str:
+        """Why the newest heatmap did not reach the map, or why the map was dropped."""
+        return self._intake.last_rejection
+
+    def place_camera(self, mount: Mount) -> None:
+        """Set how the camera sits on the vehicle; no heatmap is used before that is known."""
+        self._intake.place_camera(mount)
+
     def add_pose(self, pose: Pose) -> None:
         """Keep a pose for the heatmaps around its stamp; in the order of stamps."""
         self._intake.add_pose(pose)
@@ -66,6 +101,10 @@ class LandingCore:
     def add_heatmap(self, heatmap: Heatmap) -> None:
         """Put a heatmap into the map with the pose at its stamp, or count the reason why not."""
         self._intake.add_heatmap(heatmap)
+
+    def reject_heatmap(self, reason: str) -> None:
+        """Count a heatmap that cannot be used, and remember why."""
+        self._intake.reject(reason)
 
     def add_depth(self, depth: DepthImage) -> None:
         """Close ground that a depth image shows not flat; optional, and it opens nothing."""

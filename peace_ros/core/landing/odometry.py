@@ -120,6 +120,11 @@ class PositionCarrier:
         self._newest_view_ns = -1
         self.forget_way()
 
+    def change_camera(self, camera: Camera) -> None:
+        """Use another camera; the estimate begins again."""
+        self._odometry = VisualOdometry(camera)
+        self.forget_way()
+
     def forget_way(self) -> None:
         """Forget the estimate; it starts again from the next known position."""
         self._pending.clear()

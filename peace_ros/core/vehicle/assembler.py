@@ -11,7 +11,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.core.domain.geometry import Quaternion, quaternion_from_euler, yaw_from_quaternion
+from peace_ros.core.domain.camera import Quaternion
+from peace_ros.core.domain.geometry import quaternion_from_euler, yaw_from_quaternion
 from peace_ros.core.domain.motion import Pose, Telemetry
 from peace_ros.core.vehicle.boots import BootClock, BootMoment
 from peace_ros.core.vehicle.clock import TimeMap

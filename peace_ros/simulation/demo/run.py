@@ -72,7 +72,8 @@ class _Run:
         port = free_udp_port() if self.options.own_autopilot else None
         self.wiring = Wiring(
             world=self.world,
-            camera_px=self.options.camera_px,
+            camera=self.options.camera_options,
+            lens=self.options.lens,
             preset=self.preset.path,
             speed=self.speed,
             mavlink=self.options.mavlink or f'udpout:127.0.0.1:{port}',
@@ -100,7 +101,8 @@ def run_demo(options: DemoOptions, console: Console) -> int:
         domain = isolate(run_dir / 'logs' / 'ros')
         with console.status('preparing the world'):
             world = prepare_world(options, run_dir)
-        truth = Truth(NadirCamera(world.world, options.camera), landing.safety_radius_m)
+        eye = NadirCamera(world.world, options.camera, options.camera_options.mount)
+        truth = Truth(eye, landing.safety_radius_m)
         console.print(f'world: {world.note}', highlight=False)
         console.print(
             f'start {world.start_east_m:g},{world.start_north_m:g} m east, north of its centre; '
@@ -303,6 +305,6 @@ def _finish(
 ) -> None:
     summary.write(run_dir / 'summary.json')
     with console.status('drawing the pictures'):
-        draw_pictures(monitor.history, summary, truth, truth.camera.camera, run_dir)
+        draw_pictures(monitor.history, summary, truth, run_dir)
     console.print(headline(summary))
     console.print(summary_table(summary, run_dir))

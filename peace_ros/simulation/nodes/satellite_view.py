@@ -12,14 +12,14 @@ from typing import Any
 from sensor_msgs.msg import CameraInfo, Image
 
 from peace_ros.core.domain import PeaceError, Pose
+from peace_ros.core.messages import CAMERA_FRAME
 from peace_ros.core.node_parameters import CameraOptions
-from peace_ros.nodes.messages import image_message
+from peace_ros.nodes.messages import camera_info, image_message
 from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import IMAGE_OUT, RESULT
 from peace_ros.nodes.runtime import run
 from peace_ros.nodes.worker import NewestWorker
 from peace_ros.simulation.camera import NadirCamera
-from peace_ros.simulation.nodes.messages import camera_info
 from peace_ros.simulation.nodes.options import SATELLITE_VIEW, SatelliteViewOptions
 from peace_ros.simulation.nodes.pose_sources import (
     MavlinkSource,
@@ -54,8 +54,9 @@ class SatelliteViewNode(PeaceNode):
         """
         super().__init__('satellite_view', *SATELLITE_VIEW, **options)
         chosen = self.filled(SatelliteViewOptions)
-        self._camera = self.filled(CameraOptions).camera
-        self._view = NadirCamera(create_world(chosen), self._camera)
+        placed = self.filled(CameraOptions)
+        self._camera = replace(placed.camera, distortion=chosen.lens)
+        self._view = NadirCamera(create_world(chosen), self._camera, placed.mount)
         self._period_ns = round(1e9 / chosen.rate)
         self._due_ns: int | None = None
         self._said_mirrored = False
@@ -89,8 +90,10 @@ class SatelliteViewNode(PeaceNode):
 
     def _render(self, pose: Pose) -> None:
         view = self._view.view(pose)
+        # Before the image, which it belongs to.
+        size_px = self._camera.width_px, self._camera.height_px
+        self._info_out.publish(camera_info(size_px, self._camera, pose.stamp_ns, CAMERA_FRAME))
         self._image_out.publish(image_message(view.image_rgb, 'rgb8', pose.stamp_ns))
-        self._info_out.publish(camera_info(self._camera, pose.stamp_ns))
         if view.mirrored and not self._said_mirrored:
             self._said_mirrored = True
             self.get_logger().warning(
