@@ -114,9 +114,9 @@ class LandingOptions(ParameterSet):
         False, 'Engage once, as soon as nothing prevents it; otherwise ~/engage is called'
     )
     registration: bool = parameter(
-        False,
-        'While the autopilot knows attitude and altitude but no position, carry the map on by '
-        'comparing camera images (subscribes to image)',
+        True,
+        'Compare camera images (subscribes to image): their scale checks the altitude, and while '
+        'the autopilot knows attitude and altitude but no position they carry the map on',
     )
     image_transport: str = parameter(
         'raw',

@@ -46,7 +46,7 @@ def test_images_reach_the_core_with_their_stamps_and_bad_ones_are_passed_over(
 
 
 def test_no_images_are_asked_for_otherwise(bench):
-    node = bench.run(LandingNode, interface='twist')
+    node = bench.run(LandingNode, interface='twist', registration=False)
     assert not [each for each in node.subscriptions if each.topic_name == '/image']
 
 

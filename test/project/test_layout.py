@@ -11,9 +11,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'peace_ros'
-LINES_OF_WHAT_FLIES = 16_450
-"""Of core and nodes: 15,300, diagnostics of every input (240), live parameters (170), managed nodes
-that may share a process (460), and what people see (210)."""
+LINES_OF_WHAT_FLIES = 17_080
+"""Of core and nodes: 14,500, what learns a biased velocity and finds faulty axes, what names the
+cause that stops the vehicle (fence, second commander, failsafe after a silent line), what compares
+heights, diagnostics of every input, live parameters, managed nodes that may share a process, and
+what people see."""
 LINES_OF_A_NODE_FILE = 200
 
 

@@ -13,7 +13,7 @@ from peace_ros.core.domain.errors import (
 )
 from peace_ros.core.domain.health import Health, Level
 from peace_ros.core.domain.labels import SAFE_LABELS, Label, is_safe
-from peace_ros.core.domain.motion import Pose, Setpoint, Site, Telemetry
+from peace_ros.core.domain.motion import HeightReport, Pose, Setpoint, Site, Telemetry
 from peace_ros.core.domain.perception import Camera, DepthImage, Frame, Heatmap, Prompt, RankedWord
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     'Frame',
     'Health',
     'Heatmap',
+    'HeightReport',
     'ImageError',
     'Label',
     'Level',

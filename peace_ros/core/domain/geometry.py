@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from peace_ros.core.domain.motion import Pose
 from peace_ros.core.domain.perception import Camera
 
+GRAVITY_M_S2 = 9.80665
 Quaternion = tuple[float, float, float, float]
 
 _SQRT_HALF = 0.5**0.5
@@ -85,6 +86,17 @@ def rotation_matrix(q: Quaternion) -> NDArray[np.float64]:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def lean_acceleration(q: Quaternion) -> tuple[float, float]:
+    """Return the horizontal acceleration (north, east, m/s^2) that the lean of a multicopter gives.
+
+    Its thrust carries its weight; a lean of more than 84 degrees counts as that.
+    """
+    w, x, y, z = q
+    upright = max(0.1, 1.0 - 2.0 * (x * x + y * y))
+    scale = -2.0 * GRAVITY_M_S2 / upright
+    return scale * (x * z + w * y), scale * (y * z - w * x)
 
 
 def angle_between(a: Quaternion, b: Quaternion) -> float:

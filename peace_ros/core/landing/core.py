@@ -9,17 +9,31 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, Pose, Site, Telemetry
+from peace_ros.core.domain import (
+    Camera,
+    DepthImage,
+    Frame,
+    Heatmap,
+    HeightReport,
+    Pose,
+    Site,
+    Telemetry,
+)
 from peace_ros.core.landing.decision import Decision
+from peace_ros.core.landing.guidance import over_site
+from peace_ros.core.landing.heights import HeightWatch
 from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.intake import HeatmapIntake
 from peace_ros.core.landing.lookout import Lookout
 from peace_ros.core.landing.memory import FailedPlace
 from peace_ros.core.landing.parameters import LandingParameters
+from peace_ros.core.landing.situation import Sighting
 from peace_ros.core.landing.states import State
 from peace_ros.core.landing.watch import valid_pose
 from peace_ros.core.mapping import MapParameters, SafetyMap
 
+_PICTURE_LIMIT_NS = 2_000_000_000
+"""Age at which a picture says nothing of the height."""
 _JUMP_NS = 1_000_000_000
 """A clock that goes back by more than this was restarted."""
 
@@ -40,6 +54,7 @@ class LandingCore:
         self.safety_map = SafetyMap(map_parameters)
         self._intake = HeatmapIntake(parameters, camera, self.safety_map)
         self._lookout = Lookout(parameters, self.safety_map)
+        self._heights = HeightWatch(parameters)
         self._helm = Helm(parameters)
         self._last_ns: int | None = None
         self._drops = 0
@@ -72,12 +87,14 @@ class LandingCore:
         self._intake.add_depth(depth)
 
     def add_view(self, frame: Frame) -> None:
-        """Keep the picture of a frame, for the position while the autopilot has none."""
+        """Keep the picture of a frame: for the height, and for a position that is missing."""
         self._intake.add_view(frame)
 
     def engage(self) -> None:
         """Begin a landing, also after one that ended in ABORTED, HANDOVER or HOLD."""
         self._lookout.begin()
+        self._heights.begin()
+        self._intake.picture_height.begin()
         self._helm.engage()
 
     def disengage(self) -> None:
@@ -99,8 +116,14 @@ class LandingCore:
             self._lookout.forget_choice()
         pose, before = valid_pose(telemetry, self.parameters), self._helm.state
         sighting = self._lookout.look(now_ns, pose, before, self._helm.without_site_s)
+        heights = self._heights.see(
+            now_ns,
+            pose,
+            self._height_reports(now_ns, telemetry, pose),
+            over_site=self._is_over_site(pose, sighting),
+        )
         decision = self._helm.decide(
-            now_ns, telemetry, telemetry_age_s, sighting, self._intake.last_rejection
+            now_ns, telemetry, telemetry_age_s, sighting, self._intake.last_rejection, heights
         )
         if decision.state is not before and self._lookout.follow(before, decision.state, now_ns):
             self._helm.fail_attempt()
@@ -111,11 +134,30 @@ class LandingCore:
             attempts=self._helm.attempts,
         )
 
+    def _height_reports(
+        self, now_ns: int, telemetry: Telemetry | None, pose: Pose | None
+    ) -> tuple[HeightReport, ...]:
+        """Return the heights to compare with: those of the telemetry, and that of the pictures."""
+        reports = () if telemetry is None else telemetry.heights
+        by_picture = self._intake.picture_height
+        if pose is None or by_picture.stamp_ns is None:
+            return reports
+        if now_ns - by_picture.stamp_ns > _PICTURE_LIMIT_NS:
+            return reports
+        height_m = pose.altitude_agl_m + by_picture.above_reported_m
+        return (*reports, HeightReport('pictures', height_m, 0.0))
+
+    def _is_over_site(self, pose: Pose | None, sighting: Sighting) -> bool:
+        site = sighting.reachable
+        radius_m = self.parameters.safety_radius_m
+        return pose is not None and site is not None and over_site(pose, site, radius_m)
+
     def _keep_time(self, now_ns: int) -> None:
         """Forget everything when the clock jumps back (a restarted simulation)."""
         if self._last_ns is not None and now_ns < self._last_ns - _JUMP_NS:
             self.safety_map.clear()
             self._intake.clear()
             self._lookout.forget_choice()
+            self._heights.begin()
             self._helm.restart_clock(now_ns)
         self._last_ns = now_ns

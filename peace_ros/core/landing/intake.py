@@ -16,6 +16,7 @@ from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, ImageError
 from peace_ros.core.domain.motion import FARTHEST_M
 from peace_ros.core.landing.odometry import PositionCarrier
 from peace_ros.core.landing.parameters import LandingParameters
+from peace_ros.core.landing.picture_height import PictureHeight
 from peace_ros.core.landing.picture_watch import PictureWatch
 from peace_ros.core.landing.poses import Miss, PoseHistory, jump_m
 from peace_ros.core.mapping import RefusedLookError, SafetyMap
@@ -46,6 +47,11 @@ class HeatmapIntake:
         self._last_rejection = self._drop_reason = ''
         self.drops = 0
         """How often the map was dropped; a site chosen from it is no longer valid then."""
+
+    @property
+    def picture_height(self) -> PictureHeight:
+        """The height by the scale of the pictures."""
+        return self._carrier.height
 
     @property
     def last_rejection(self) -> str:

@@ -15,7 +15,7 @@ import json
 import sys
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import cos, hypot, inf, pi, sin
 from pathlib import Path
 from time import monotonic
@@ -24,11 +24,24 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import Camera, Heatmap, Pose, Setpoint, Site, Telemetry, VehicleError
+from peace_ros.core.domain import (
+    Camera,
+    Heatmap,
+    HeightReport,
+    Pose,
+    Setpoint,
+    Site,
+    Telemetry,
+    VehicleError,
+)
 from peace_ros.core.domain.geometry import ground_to_image
 from peace_ros.core.landing import Decision, LandingCore, LandingParameters, State
 from peace_ros.core.mapping import MapParameters
-from peace_ros.simulation.autopilot.estimate_errors import PX4_ERRORS, EstimateErrors
+from peace_ros.simulation.autopilot.estimate_errors import (
+    PX4_ERRORS,
+    EstimateErrors,
+    GnssAltitudeError,
+)
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import Mode
@@ -101,6 +114,8 @@ class WindFlight:
         seed: Of gusts, direction, place of the island and errors of the heatmaps.
         heatmap_hz: Heatmaps per second.
         px4_errors: Above 0: fly as PX4, with so many times its measured errors.
+        start_m: Height at which the flight begins.
+        gnss_noise_m: Standard deviation of the GNSS altitude.
     """
 
     def __init__(
@@ -110,6 +125,8 @@ class WindFlight:
         seed: int,
         heatmap_hz: float = 5.0,
         px4_errors: float = 0.0,
+        start_m: float = START_M,
+        gnss_noise_m: float = 0.0,
     ) -> None:
         self._random = np.random.default_rng(seed)
         self._seed, self._heatmap_s = seed, 1.0 / heatmap_hz
@@ -118,7 +135,8 @@ class WindFlight:
         physics = Physics(wind_to_m_s=wind, gust_m_s=gust_m_s, seed=seed)
         kind = Kind.PX4 if px4_errors > 0.0 else Kind.ARDUPILOT
         errors = EstimateErrors(PX4_ERRORS.times(px4_errors), seed)
-        self._flight = flying(physics, Personality(kind), errors)
+        gnss = GnssAltitudeError(gnss_noise_m, seed)
+        self._flight = flying(physics, Personality(kind), errors, gnss, start_m)
         self._ground = self._painted()
         self._camera = Camera.from_degrees(_PIXELS, _PIXELS, 73)
         self._core = LandingCore(LandingParameters(), self._camera, MapParameters(map_size_m=160.0))
@@ -128,7 +146,7 @@ class WindFlight:
         self._telemetry = Telemetry(received_ns=0)
         self._told_s = self._now_s
         self._due_s = dict.fromkeys(('pose', 'heatmap', 'step'), self._now_s)
-        self._lowest_m = START_M
+        self._lowest_m = start_m
         self.track: list[tuple[float, float, float, Decision]] = []
         """Time, true north and east, and the decision of each step."""
 
@@ -180,12 +198,20 @@ class WindFlight:
         q = self._flight.physics.quaternion_ned_frd
         return Pose(round(self._now_s * 1e9), north, east, down, q, -down)
 
+    def _seen_from(self) -> Pose:
+        """Return the pose of now with the true height."""
+        return replace(self._pose(), altitude_agl_m=-self._flight.physics.down_m)
+
+    def _heights(self) -> tuple[HeightReport, ...]:
+        """Return what other sources than the barometer report now."""
+        return ()
+
     def _report(self) -> None:
         velocity = self._flight.velocity_m_s
         self._poses.append((self._now_s + _LINE_DELAY_S, self._pose(), velocity))
 
     def _look(self) -> None:
-        pose = self._pose()
+        pose = self._seen_from()
         matrix = ground_to_image(self._camera, pose) @ np.array(
             [[0.0, _CELL_M, -_HALF_M], [_CELL_M, 0.0, -_HALF_M], [0.0, 0.0, 1.0]]
         )
@@ -201,7 +227,16 @@ class WindFlight:
             self._core.add_pose(pose)
             self._told_s = self._now_s
             self._telemetry = Telemetry(
-                1, pose, *velocity, armed=True, in_control=True, mode='GUIDED', landed=False
+                received_ns=1,
+                pose=pose,
+                v_north_m_s=velocity[0],
+                v_east_m_s=velocity[1],
+                v_down_m_s=velocity[2],
+                armed=True,
+                in_control=True,
+                mode='GUIDED',
+                landed=False,
+                heights=self._heights(),
             )
         while self._heatmaps and self._heatmaps[0][0] <= self._now_s:
             self._core.add_heatmap(self._heatmaps.popleft()[1])
@@ -248,7 +283,11 @@ def to_and_fro_m(places_m: NDArray[np.float64]) -> float:
 
 
 def flying(
-    physics: Physics, personality: Personality | None = None, errors: EstimateErrors | None = None
+    physics: Physics,
+    personality: Personality | None = None,
+    errors: EstimateErrors | None = None,
+    gnss: GnssAltitudeError | None = None,
+    start_m: float = START_M,
 ) -> Flight:
     """Return an autopilot that has hovered in this wind for a while, in GUIDED or OFFBOARD.
 
@@ -256,11 +295,13 @@ def flying(
         physics: Of the vehicle, at rest on the ground.
         personality: Which autopilot; None: ArduPilot.
         errors: Of its estimates; None: none.
+        gnss: Error of the GNSS altitude; None: none.
+        start_m: Height at which it hovers.
 
     Raises:
         VehicleError: it does not come into the air.
     """
-    flight = Flight(physics, personality, errors=errors)
+    flight = Flight(physics, personality, errors=errors, gnss=gnss)
     while not flight.has_position:
         flight.step(_TICK_S)
     flight.set_mode(Mode.STABILIZE if flight.personality.is_px4 else Mode.GUIDED)
@@ -272,7 +313,7 @@ def flying(
             raise VehicleError(f'the simulated vehicle did not take off within {_BOOT_S:g} s')
         flight.step(_TICK_S)
     physics.north_m = physics.east_m = 0.0
-    physics.down_m = -START_M
+    physics.down_m = -start_m
     for mode in (Mode.BRAKE, Mode.GUIDED):
         flight.take_velocity(_target(Setpoint(0)))
         flight.set_mode(mode)

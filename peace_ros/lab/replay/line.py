@@ -76,6 +76,7 @@ class ReplayLine:
         """
         look = self.pipeline.look(frame)
         self._feed_poses(frame.stamp_ns)
+        self.landing.add_view(frame)
         self.landing.add_heatmap(look.heatmap)
         return look
 

@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import CameraInfo, Image
 
 from peace_ros.core.domain import PeaceError, Pose
@@ -27,7 +29,10 @@ from peace_ros.simulation.nodes.pose_sources import (
     TopicSource,
     TwistSource,
 )
+from peace_ros.simulation.positions import SILENT_S
 from peace_ros.simulation.world import World, draw_world, load_world
+
+_LOOK_S = 0.5
 
 
 def create_world(options: SatelliteViewOptions) -> World:
@@ -62,7 +67,9 @@ class SatelliteViewNode(PeaceNode):
         self._image_out = self.create_publisher(Image, 'image', IMAGE_OUT)
         self._info_out = self.create_publisher(CameraInfo, 'camera_info', RESULT)
         self._worker = NewestWorker(self._render, self._complain, self.fail, 'satellite_view')
+        self._seen_s = time.monotonic()
         self._source = self._create_source(chosen)
+        self.create_timer(_LOOK_S, self._explain, clock=Clock(clock_type=ClockType.STEADY_TIME))
         east_m, north_m = self._view.world.size_m
         self.get_logger().info(
             f'ready: world {self._view.world.name} of {east_m:.0f} x {north_m:.0f} m, '
@@ -80,12 +87,18 @@ class SatelliteViewNode(PeaceNode):
 
     def _on_pose(self, pose: Pose) -> None:
         """Keep the frame rate by the stamps, so that it holds on any clock."""
+        self._seen_s = time.monotonic()
         due_ns, period_ns = self._due_ns, self._period_ns
         if due_ns is not None and due_ns - 2 * period_ns < pose.stamp_ns < due_ns:
             return
         late = due_ns is None or not due_ns <= pose.stamp_ns < due_ns + period_ns
         self._due_ns = (pose.stamp_ns if late or due_ns is None else due_ns) + period_ns
         self._worker.offer(pose)
+
+    def _explain(self) -> None:
+        """Say why nothing is seen, after a while without a pose."""
+        if time.monotonic() - self._seen_s >= SILENT_S and self._source.problem:
+            self.say('camera', f'waiting for the camera: {self._source.problem}')
 
     def _render(self, pose: Pose) -> None:
         view = self._view.view(pose)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frame conversions, each against what a person can check by hand."""
 
-from math import degrees, radians, tan
+from math import degrees, isfinite, pi, radians, tan
 
 import numpy as np
 import pytest
@@ -18,6 +18,7 @@ from peace_ros.core.domain.geometry import (
     ground_to_image,
     image_to_ground,
     interpolate,
+    lean_acceleration,
     ned_to_enu,
     quaternion_from_euler,
     rotation_matrix,
@@ -126,3 +127,20 @@ def test_slerp_takes_the_shorter_arc() -> None:
     a = quaternion_from_euler(0, 0, radians(170))
     b = quaternion_from_euler(0, 0, radians(-170))
     assert abs(degrees(yaw_from_quaternion(slerp(a, b, 0.5)))) == pytest.approx(180.0)
+
+
+@pytest.mark.parametrize(
+    ('roll', 'pitch', 'yaw', 'north', 'east'),
+    [
+        (0.0, 0.0, 1.0, 0.0, 0.0),
+        (0.0, -0.3, 0.0, 9.80665 * tan(0.3), 0.0),
+        (0.3, 0.0, 0.0, 0.0, 9.80665 * tan(0.3)),
+        (0.3, 0.0, pi / 2.0, -9.80665 * tan(0.3), 0.0),
+    ],
+)
+def test_the_thrust_of_a_multicopter_accelerates_it_to_where_it_leans(
+    roll: float, pitch: float, yaw: float, north: float, east: float
+) -> None:
+    lean = lean_acceleration(quaternion_from_euler(roll, pitch, yaw))
+    assert lean == pytest.approx((north, east), abs=1e-9)
+    assert all(isfinite(each) for each in lean_acceleration(quaternion_from_euler(pi, pitch, yaw)))
