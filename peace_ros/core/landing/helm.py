@@ -127,7 +127,7 @@ class Helm:
         self._advance(situation, self._events(situation, bad_data))
         situation = replace(situation, search_target=self._search_target(situation))
         wish, note = velocity(self.state, situation, p)
-        self._drift.see(pose if self._engaged else None, self._told)
+        self._drift.see(pose, self._told)
         wish = self._drift.made_up(wish, self._lateral_limit_m_s(pose))
         setpoint, guard_notes = self._guard.limit(wish, situation)
         self._told = setpoint
@@ -148,7 +148,7 @@ class Helm:
         )
 
     def _lateral_limit_m_s(self, pose: Pose | None) -> float:
-        high = pose is not None and at_safe_altitude(pose, self._p)
+        high = at_safe_altitude(pose, self._p)
         return self._p.lateral_speed_limit if high else self._p.landing_lateral_speed_limit
 
     def _time_in_state_s(self, now_ns: int) -> float:

@@ -13,7 +13,6 @@ from collections import Counter, deque
 import numpy as np
 
 from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, ImageError, Pose
-from peace_ros.core.domain.motion import FARTHEST_M
 from peace_ros.core.landing.odometry import PositionCarrier
 from peace_ros.core.landing.parameters import LandingParameters
 from peace_ros.core.landing.picture_watch import PictureWatch
@@ -64,8 +63,7 @@ class HeatmapIntake:
     def add_pose(self, pose: Pose) -> None:
         """Keep a pose, north and east NaN where unknown, and use the heatmaps that wait for it."""
         if not pose.has_position:
-            can_be = abs(pose.altitude_agl_m) <= FARTHEST_M and pose.has_attitude
-            kept = can_be and self._carrier.add_pose(pose)
+            kept = self._carrier.add_pose(pose)
         else:
             before = self._poses.newest
             kept = self._poses.add(pose)
