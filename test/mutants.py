@@ -57,7 +57,7 @@ GROUPS = {
     'states': Group(['core/landing/states.py'], ['core/landing/test_states.py']),
     'core': Group(['core/landing/core.py'], ['core/landing/test_core.py']),
     'vehicle': Group(
-        ['core/vehicle/sender.py', 'core/vehicle/obedience.py'],
+        ['core/vehicle/sender.py', 'core/vehicle/obedience.py', 'core/vehicle/faulty_axes.py'],
         [
             'core/vehicle/test_sender.py',
             'core/vehicle/test_sender_limits.py',
