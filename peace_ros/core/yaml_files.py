@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from math import isinf
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import yaml
 
@@ -20,8 +21,40 @@ Sections = Mapping[str, Mapping[str, Any]]
 _REMEDY = 'give a ROS parameter file'
 
 
+_TRUE = frozenset(['y', 'Y', 'yes', 'Yes', 'YES', 'true', 'True', 'TRUE', 'on', 'On', 'ON'])
+_FALSE = frozenset(['n', 'N', 'no', 'No', 'NO', 'false', 'False', 'FALSE', 'off', 'Off', 'OFF'])
+_INTEGER = re.compile(r'[-+]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)')
+_REAL = re.compile(
+    r'[-+]?((\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|inf|infinity|nan)|[-+]?\.inf|\.nan', re.IGNORECASE
+)
+_LONGEST_NUMBER = 64
+_PLAIN = '!plain'
+
+
+def _scalar(text: str) -> bool | int | float | str:
+    """Return what ROS takes a word without quotes for; PyYAML takes 1e5 for a text, 1:30 for 90."""
+    if text in _TRUE or text in _FALSE:
+        return text in _TRUE
+    if len(text) <= _LONGEST_NUMBER and _INTEGER.fullmatch(text):
+        octal = re.fullmatch(r'[-+]?0[0-7]+', text)
+        whole = int(text, 8 if octal else 0)
+        return whole if -(2**63) <= whole < 2**63 else float(whole)
+    if _REAL.fullmatch(text):
+        real = float(text.lower().replace('.inf', 'inf').replace('.nan', 'nan'))
+        # What a double cannot hold stays a text, which no parameter of a number accepts.
+        overflows = isinf(real) and 'inf' not in text.lower()
+        return text if overflows else real
+    return text
+
+
 class _Loader(yaml.SafeLoader):
-    """PyYAML keeps the last of two equal names without a word, and takes 1e5 for a text."""
+    """Reads words without quotes as ROS does, and refuses a name that stands twice."""
+
+    yaml_implicit_resolvers = {  # noqa: RUF012 (PyYAML's own name and kind)
+        None: [(_PLAIN, re.compile('.+', re.DOTALL))],
+        '<': [('tag:yaml.org,2002:merge', re.compile('<<$'))],
+        '': [('tag:yaml.org,2002:null', re.compile('$'))],
+    }
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen: set[str] = set()
@@ -30,12 +63,16 @@ class _Loader(yaml.SafeLoader):
             if name in seen:
                 raise yaml.YAMLError(f'{name} is there twice (line {key.start_mark.line + 1})')
             seen.add(name)
+            if key.tag == _PLAIN:
+                key.tag = 'tag:yaml.org,2002:str'  # a parameter may be called y
         return super().construct_mapping(node, deep)
 
 
-_Loader.add_implicit_resolver(
-    'tag:yaml.org,2002:float', re.compile(r'[-+]?\d+\.?\d*[eE][-+]?\d+$'), list('-+0123456789')
-)
+def _plain(loader: yaml.SafeLoader, node: yaml.Node) -> bool | int | float | str:
+    return _scalar(str(loader.construct_scalar(cast('yaml.ScalarNode', node))))
+
+
+_Loader.add_constructor(_PLAIN, _plain)
 
 
 def read_yaml(path: Path, remedy: str) -> Any:

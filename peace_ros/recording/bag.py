@@ -5,14 +5,13 @@
 from __future__ import annotations
 
 import shutil
-import struct
 import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, final
 
-from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.interfaces import (
     Connection,
     Qos,
@@ -25,7 +24,6 @@ from rosbags.interfaces import (
 from rosbags.rosbag2 import (
     CompressionFormat,
     CompressionMode,
-    ReaderError,
     StoragePlugin,
     Writer,
     WriterError,
@@ -34,31 +32,36 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from peace_ros.core.domain import RecordingError
+from peace_ros.recording.storages import (
+    MCAP_ERRORS,
+    ROSBAGS_ERRORS,
+    STORAGES,
+    Storages,
+    TopicOfFile,
+    files_of,
+    is_recording,
+)
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 """Message classes of ROS 2 Jazzy, shared by all readers and writers of the package."""
 
-_UNREADABLE = (
-    AnyReaderError,
-    ReaderError,
+_ROS1 = get_typestore(Stores.ROS1_NOETIC)
+_UNREADABLE: tuple[type[Exception], ...] = (
+    *ROSBAGS_ERRORS,
+    *MCAP_ERRORS,
     SerdeError,
     TypesysError,
     OSError,
-    EOFError,
-    ValueError,
-    KeyError,
-    IndexError,
     AssertionError,
-    struct.error,
 )
-"""What rosbags lets out, beside its own errors, on files that are cut short or overwritten."""
+"""What the readers let out, beside their own errors, on files that are cut short or overwritten."""
 
 
 @final
 class BagReader:
-    """A bag folder (``metadata.yaml`` beside its files), an ``.mcap`` or a ``.db3`` file.
+    """A bag folder, an ``.mcap`` or ``.db3`` file of it, or a ``.bag`` of ROS 1.
 
-    Use it as a context manager; messages come out deserialised, with the attributes of the ROS
+    Use it as a context manager; messages come out deserialised, with the attributes of the ROS 2
     message and arrays as numpy arrays.
     """
 
@@ -66,41 +69,45 @@ class BagReader:
         self.path = path
         if not path.exists():
             raise RecordingError(f'bag {path} does not exist: give a bag folder, .mcap or .db3')
-        if path.is_dir() and not (path / 'metadata.yaml').is_file():
-            raise RecordingError(
-                f'folder {path} holds no metadata.yaml: give a bag folder, or its .mcap or .db3'
-            )
-        self._reader: AnyReader | None = None
+        if not is_recording(path):
+            raise RecordingError(f'{path} is no bag: give a folder, {", ".join(STORAGES)}')
+        files_of(path)
+        self._storages: Storages | None = None
 
     def __enter__(self) -> BagReader:
         """Open the file.
 
         Raises:
-            RecordingError: it is not a bag, is cut short, or is of an unknown kind.
+            RecordingError: it is not a bag, is damaged, or is of an unknown kind.
         """
         try:
-            reader = AnyReader([self.path], default_typestore=TYPESTORE)
-            reader.open()
+            self._storages = Storages(self.path)
+        except RecordingError:
+            raise
         except Exception as error:
             # apsw and zstd bring error types of their own, which are not imported here.
             raise self._unreadable(error) from error
-        self._reader = reader
         return self
 
     def __exit__(self, *_error: object) -> None:
         """Close the file."""
-        reader, self._reader = self._reader, None
-        if reader is not None:
-            reader.close()
+        storages, self._storages = self._storages, None
+        if storages is not None:
+            storages.close()
+
+    @property
+    def remarks(self) -> list[str]:
+        """What the user has to know about the file, such as where it breaks off."""
+        return self._opened().remarks
 
     @property
     def topics(self) -> dict[str, str]:
-        """Topic -> message type (``sensor_msgs/msg/Image``), in alphabetical order."""
-        return {each.topic: each.msgtype for each in self._connections()}
+        """TopicOfFile -> message type (``sensor_msgs/msg/Image``), in alphabetical order."""
+        return {each.name: each.type for each in self._topics()}
 
     def count(self, topic: str) -> int:
-        """Return how many messages of a topic the index of the bag lists."""
-        return sum(each.msgcount for each in self._connections() if each.topic == topic)
+        """Return how many messages of a topic the bag holds."""
+        return sum(each.messages for each in self._topics() if each.name == topic)
 
     def require(self, topic: str, types: Collection[str]) -> str:
         """Return the type of a topic that must exist and have one of some types.
@@ -131,32 +138,40 @@ class BagReader:
         """
         for topic in topics:
             self.require(topic, tuple(self.topics.values()))
-        chosen = [each for each in self._connections() if each.topic in topics]
-        if not chosen:
-            return
         try:
-            for connection, stamp_ns, raw in self._opened().messages(connections=chosen):
-                yield (
-                    connection.topic,
-                    stamp_ns,
-                    self._opened().deserialize(raw, connection.msgtype),
-                )
+            for raw in self._opened().messages(topics):
+                yield raw.topic.name, raw.stamp_ns, _deserialised(raw.data, raw.topic)
         except _UNREADABLE as error:
             raise self._unreadable(error) from error
 
-    def _opened(self) -> AnyReader:
-        if self._reader is None:
+    def _opened(self) -> Storages:
+        if self._storages is None:
             raise RecordingError(f'bag {self.path} is not open: use it in a with statement')
-        return self._reader
+        return self._storages
 
-    def _connections(self) -> list[Connection]:
-        return sorted(self._opened().connections, key=lambda each: each.topic)
+    def _topics(self) -> list[TopicOfFile]:
+        return sorted(self._opened().topics, key=lambda each: each.name)
 
     def _unreadable(self, error: Exception) -> RecordingError:
+        remedy = {
+            '.mcap': '"mcap recover" may save a part of it',
+            '.bag': '"rosbag reindex" may save a part of it',
+        }.get(self.path.suffix.lower(), '"ros2 bag reindex" may repair its metadata')
         return RecordingError(
             f'bag {self.path} cannot be read ({type(error).__name__}: {error}): give an intact '
-            'bag folder, .mcap or .db3 (ros2 bag reindex may repair it)'
+            f'one; {remedy}'
         )
+
+
+def _deserialised(data: bytes, topic: TopicOfFile) -> Any:
+    if not topic.is_ros1:
+        return TYPESTORE.deserialize_cdr(data, topic.type)
+    message: Any = _ROS1.deserialize_ros1(data, topic.type)
+    if topic.type == 'sensor_msgs/msg/CameraInfo':
+        # ROS 1 writes the matrices with capital letters.
+        fields = {name.lower(): value for name, value in vars(message).items()}
+        return SimpleNamespace(**fields)
+    return message
 
 
 @final
@@ -177,7 +192,7 @@ class BagWriter:
         self._writer: Writer | None = None
         self._connections: dict[str, Connection] = {}
         self.counts: dict[str, int] = {}
-        """Topic -> messages written so far."""
+        """TopicOfFile -> messages written so far."""
 
     def __enter__(self) -> BagWriter:
         """Create the hidden folder.

@@ -5,16 +5,20 @@
 from __future__ import annotations
 
 import re
+from array import array
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 import yaml
+from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.domain.parameters import ParameterSet, describe, parameter
 from peace_ros.core.node_parameters import named
+from peace_ros.core.yaml_files import read_sections
 from peace_ros.lab.parameter_docs import (
     NODE_PARAMETERS,
     allowed,
@@ -198,3 +202,26 @@ def test_presets_are_the_six_of_the_paper_and_their_values_exist():
             assert section['ros__parameters']['template'] == prompt.upper()
         family = yaml.safe_load(path.read_text())['segmentation']['ros__parameters']['family']
         assert family == {'cs': 'clipseg', 'fs': 'fastsam'}[model]
+
+
+def test_rcl_takes_a_file_for_the_same_values_as_the_reader_of_replay():
+    path = ROOT / 'test' / 'data' / 'plain_words.yaml'
+    read = read_sections(path)['/**']
+    context = Context()
+    context.init(['--ros-args', '--params-file', str(path)])
+    node = Node(
+        'sample',
+        context=context,
+        automatically_declare_parameters_from_overrides=True,
+        start_parameter_services=False,
+    )
+    try:
+        taken = {name: node.get_parameter(name).value for name in read}
+    finally:
+        node.destroy_node()
+        context.shutdown()
+    taken = {name: list(each) if isinstance(each, array) else each for name, each in taken.items()}
+    assert taken == read
+    assert {name: type(each) for name, each in taken.items()} == {
+        name: type(each) for name, each in read.items()
+    }

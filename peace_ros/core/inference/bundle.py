@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import hashlib
+import mmap
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +19,7 @@ from peace_ros.core.resources import models_dir
 
 MANIFEST_NAME = 'manifest.json'
 _CHUNK_BYTES = 1 << 20
+_LOCATION = re.compile(rb'\x0a\x08location\x12([\x80-\xff][\x01-\x7f]|[\x01-\x7f])', re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class Bundle:
         manifest = parse_manifest(raw, str(manifest_path))
         for name, entry in manifest.files.items():
             _check_file(folder / name, entry)
+            _check_references(folder / name, manifest)
         paths = {role: folder / name for role, name in manifest.roles.items()}
         return cls(folder, manifest, hashlib.sha256(raw).hexdigest(), MappingProxyType(paths))
 
@@ -109,3 +113,24 @@ def _check_file(path: Path, entry: FileEntry) -> None:
             f'{path}: SHA-256 {found} where the manifest says {entry.sha256}; '
             'the file was changed or damaged, fetch or build the bundle again'
         )
+
+
+def _check_references(path: Path, manifest: Manifest) -> None:
+    """Refuse a graph that keeps weights in a file that the manifest does not list.
+
+    Such a file could be replaced while every checksum stays right. The graph names it in a pair
+    of texts whose key is ``location`` (StringStringEntryProto of onnx.proto), which stands in the
+    file as it is.
+    """
+    if path.suffix != '.onnx':
+        return
+    with path.open('rb') as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as graph:
+        for found in _LOCATION.finditer(graph):
+            end = found.end()
+            length = found[1][0] & 0x7F | (found[1][-1] << 7 if len(found[1]) == 2 else 0)
+            name = bytes(graph[end : end + length]).decode('utf-8', 'replace')
+            if name not in manifest.files:
+                raise BundleError(
+                    f'{path} keeps weights in {name!r}, which the manifest does not list: export '
+                    'the bundle again'
+                )

@@ -36,6 +36,9 @@ MAX_INPUT_PX = 4096
 LOGIT_SCALE = 100.0
 """exp of the temperature at which CLIP's training was held (Radford et al. 2021, section 2.5)."""
 _SHA256 = re.compile(r'[0-9a-f]{64}')
+THRESHOLDS = (0.01, 0.99)
+"""Scores that a bundle may recommend to call ground safe from; beyond them all is called so, or
+nothing."""
 _FILE_NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.\-]*')
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from peace_ros.core.domain import BundleError, ConfigurationError, Frame, Heatmap, Prompt
 from peace_ros.core.domain.parameters import ParameterSet, parameter
 from peace_ros.core.inference import Bundle, TextEncoder, open_sessions
+from peace_ros.core.inference.manifest import THRESHOLDS
 from peace_ros.core.inference.providers import Footprint, LoadMeter
 from peace_ros.core.segmentation.fusion import FUSIONS
 from peace_ros.core.segmentation.terms import Terms
@@ -178,9 +179,10 @@ class BundleSegmenter(Segmenter):
 
 def _recommended_threshold(bundle: Bundle) -> float:
     threshold = float(bundle.manifest.recommended.get('threshold', 0.5))
-    if not 0.0 < threshold < 1.0:
+    low, high = THRESHOLDS
+    if not low <= threshold <= high:
         raise BundleError(
             f'{bundle.folder / "manifest.json"}: recommended threshold {threshold} must lie '
-            'between 0 and 1, both excluded: correct the manifest or export the bundle again'
+            f'between {low} and {high}: correct the manifest or export the bundle again'
         )
     return threshold

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -36,6 +37,9 @@ _STAY_S = 3.0
 _PAUSE_S = 0.3
 """The relay runs every 10 ms and the vehicle publishes every 20 ms: a machine that lets one of
 them wait for so long is too slow for limits of some tenths of a second."""
+_WAITING = 4.0
+"""Processes that want to run per core, over the last minute; two flights at a time make two to
+three. With more, a process that starts again takes seconds longer."""
 _HEATMAP_S = 1.0
 """The networks give six heatmaps per second: the limits need one in this time at least."""
 
@@ -186,7 +190,8 @@ class Scenario:
         ):
             if gap_s > limit_s:
                 told.append(f'{what} for {gap_s:.1f} s, {limit_s:g} s allowed')
-        return '; '.join(told)
+        told.append(overload(os.getloadavg()[0], os.cpu_count() or 1))
+        return '; '.join(filter(None, told))
 
     def _watch_person(self, walker: Walker) -> None:
         """Note for how long the vehicle descended with the person below."""
@@ -231,3 +236,16 @@ def unsafe_ground(
     if walker is not None and walker.distance_m(pose, pose.stamp_ns) <= radius_m:
         return f'a person is {walker.distance_m(pose, pose.stamp_ns):.1f} m beside the point'
     return ''
+
+
+def overload(load: float, cores: int) -> str:
+    """Return in words that too many processes share the cores, empty when they do not.
+
+    Args:
+        load: processes that want to run, over the last minute.
+        cores: of the machine.
+    """
+    waiting = load / cores
+    if waiting <= _WAITING:
+        return ''
+    return f'{waiting:.1f} processes for each core, {_WAITING:g} allowed'

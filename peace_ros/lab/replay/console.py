@@ -46,9 +46,14 @@ def _table(report: ReplayReport, folder: Path) -> Table:
         frames += f', {report.unusable_frames} unusable: {report.first_fault}'
     states = ', '.join(f'{each["name"]} {float(each["seconds"]):.1f} s' for each in report.states)
     fates = ', '.join(f'{count} {fate}' for fate, count in report.heatmaps.items())
+    altitudes = 'none'
+    if report.altitudes_m is not None:
+        altitudes = '{:.1f} to {:.1f} m above ground'.format(*report.altitudes_m)
     for name, value in (
         ('recording', report.source),
         ('frames', frames),
+        *(('note', each) for each in report.remarks),
+        ('altitude', altitudes),
         (
             'recorded',
             f'{report.recorded_s:.1f} s, replayed {report.faster_than_life:.1f} x as fast',

@@ -15,6 +15,8 @@ from peace_ros.core.presets import Preset
 
 STEP_NS = 100_000_000
 """The landing core decides at 10 Hz of recorded time."""
+_MOST_GAP_NS = 60_000_000_000
+"""Longer than any time limit of the landing but that of a whole search."""
 _VELOCITY_SPAN_NS = 200_000_000
 _MODE = 'REPLAY'
 
@@ -76,6 +78,17 @@ class ReplayLine:
         self._feed_poses(frame.stamp_ns)
         self.landing.add_heatmap(look.heatmap)
         return look
+
+    def skip_gap(self, stamp_ns: int) -> float:
+        """Go on at a stamp when there is none for long before it; return the gap in seconds.
+
+        A clock that jumps would be filled with decisions about nothing, for years if need be.
+        """
+        if self._now_ns is None or stamp_ns - self._now_ns <= _MOST_GAP_NS:
+            return 0.0
+        gap_s = (stamp_ns - self._now_ns) * 1e-9
+        self._now_ns = stamp_ns
+        return gap_s
 
     def steps_until(self, stamp_ns: int) -> Iterator[Step]:
         """Yield the decisions that fall due up to a stamp."""

@@ -30,6 +30,10 @@ class ReplayReport:
     unusable_frames: int = 0
     first_fault: str = ''
     """Why the first unusable frame was one."""
+    remarks: list[str] = field(default_factory=list)
+    """What the user has to know of the recording, such as what was left out of it."""
+    altitudes_m: tuple[float, float] | None = None
+    """Highest and lowest altitude above ground of the poses."""
     recorded_s: float = 0.0
     """From the first frame to the last."""
     elapsed_s: float = 0.0
@@ -79,8 +83,10 @@ class ReplayReport:
 class ReportBuilder:
     """Follows a replay and fills its report."""
 
-    def __init__(self, source: str, config: str) -> None:
-        self.report = ReplayReport(source, config)
+    def __init__(
+        self, source: str, config: str, remarks: list[str], altitudes_m: tuple[float, float] | None
+    ) -> None:
+        self.report = ReplayReport(source, config, remarks=remarks, altitudes_m=altitudes_m)
         self._verdicts: Counter[str] = Counter()
         self._safe_sum = 0.0
         self._span_ns: tuple[int, int] | None = None

@@ -91,7 +91,13 @@ class Replayer:
         self._source = source
         self._preset = load_preset(config)
         self._threads = threads
-        self._builder = ReportBuilder(str(source.path), self._preset.name)
+        heights = [round(pose.altitude_agl_m, 1) for pose in source.poses]
+        self._builder = ReportBuilder(
+            str(source.path),
+            self._preset.name,
+            list(source.remarks),
+            (max(heights), min(heights)) if heights else None,
+        )
 
     @property
     def report(self) -> ReplayReport:
@@ -115,6 +121,8 @@ class Replayer:
             if line is None:
                 line = self._line(taken)
             last_ns = taken.stamp_ns
+            if gap_s := line.skip_gap(taken.stamp_ns):
+                self.report.remarks.append(f'nothing was recorded for {gap_s:.0f} s: left out')
             for step in line.steps_until(taken.stamp_ns):
                 self._builder.add_step(step)
                 yield step

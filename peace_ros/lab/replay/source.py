@@ -5,8 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from math import radians
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import isfinite, radians
 from pathlib import Path
 from typing import Annotated, Protocol
 
@@ -21,11 +22,14 @@ from peace_ros.core.messages import (
 )
 from peace_ros.recording import AltitudeProfile, BagReader, VideoReader
 from peace_ros.recording.messages import IMAGE_TYPES, POSE_TYPES, fov_x_rad_of
+from peace_ros.recording.storages import STORAGES, is_recording
 from peace_ros.recording.video import VIDEO_SUFFIXES
 
 DEFAULT_FOV_DEG = 73.0
 DEFAULT_ALTITUDE = '100:20'
 _CAMERA_INFO = 'sensor_msgs/msg/CameraInfo'
+_CLOCKS_APART_S = 3600.0
+"""A recording may begin long before its first image; clocks that differ, differ by more."""
 _STATUS_TOPIC = '/landing/status'
 _PREFERRED_IMAGES = ('/image', '/image/compressed')
 _PREFERRED_POSES = ('/ground_truth/pose', '/pose')
@@ -56,6 +60,15 @@ class SourceOptions:
     altitude: Annotated[
         str, Option(metavar='START:END', help='Metres, linear over the file; for videos.')
     ] = DEFAULT_ALTITUDE
+    ground_m: Annotated[
+        float,
+        Option(
+            '--ground',
+            metavar='M',
+            help='z of the ground in the poses of a bag, where they do not count from there but '
+            'from sea level or the place of arming.',
+        ),
+    ] = 0.0
     every: Annotated[int, Option(metavar='N', help='Take every N-th frame.')] = 1
     hz: Annotated[
         float | None, Option(metavar='HZ', help='Take at most HZ frames per recorded second.')
@@ -65,6 +78,8 @@ class SourceOptions:
     def __post_init__(self) -> None:
         if self.every < 1:
             raise RecordingError(f'--every {self.every}: give 1 or more')
+        if not isfinite(self.ground_m):
+            raise RecordingError(f'--ground {self.ground_m}: give the metres of z at the ground')
         if self.hz is not None and not 0.0 < self.hz <= 1000.0:
             raise RecordingError(f'--hz {self.hz}: give more than 0 and at most 1000')
         if self.limit is not None and self.limit < 1:
@@ -93,6 +108,8 @@ class RecordingSource(Protocol):
     """In the order of their stamps."""
     engage_ns: int | None
     """When the recorded landing began; None engages with the first frame."""
+    remarks: list[str]
+    """What the user has to know of the recording, such as what was left out of it."""
 
     def frames(self) -> Iterator[Taken]:
         """Yield the chosen frames in the order of their stamps."""
@@ -140,6 +157,9 @@ class VideoSource:
         self.fov_x_rad = radians(options.fov_x_deg or DEFAULT_FOV_DEG)
         self.poses = [self._reader.pose(index) for index in range(self._reader.count)]
         self.engage_ns: int | None = None
+        self.remarks = [
+            f'no altitude was recorded: {options.altitude} m is assumed, linear (--altitude)'
+        ]
         self.frame_hz = self._reader.frame_hz / options.every
 
     def frames(self) -> Iterator[Taken]:
@@ -170,7 +190,12 @@ class BagSource:
                 raise RecordingError(
                     f'topic {self.image_topic} of bag {path} has 0 messages: choose another'
                 )
-            self.poses = _poses(bag, self.pose_topic)
+            self.remarks = list(bag.remarks)
+            self.poses = [
+                replace(pose, altitude_agl_m=pose.altitude_agl_m - options.ground_m)
+                for pose in _poses(bag, self.pose_topic, self.remarks)
+            ]
+            self._unstamped = _unstamped(bag, self.image_topic, self.poses, self.remarks)
             self.fov_x_rad = _field_of_view(bag, options)
             self.engage_ns = _engaged_ns(bag)
 
@@ -179,8 +204,8 @@ class BagSource:
         picker = _Picker(self._options)
         last_ns = -1
         with BagReader(self.path) as bag:
-            for _, _, message in bag.messages([self.image_topic]):
-                stamp_ns = stamp_ns_of(message)
+            for _, receipt_ns, message in bag.messages([self.image_topic]):
+                stamp_ns = receipt_ns if self._unstamped else stamp_ns_of(message)
                 if not picker.takes(stamp_ns):
                     continue
                 if stamp_ns <= last_ns:
@@ -189,7 +214,7 @@ class BagSource:
                     continue
                 last_ns = stamp_ns
                 try:
-                    yield Taken(stamp_ns, frame_from_message(message))
+                    yield Taken(stamp_ns, replace(frame_from_message(message), stamp_ns=stamp_ns))
                 except ImageError as error:
                     yield Taken(stamp_ns, None, str(error))
                 if picker.is_done:
@@ -206,10 +231,10 @@ def open_source(path: Path, options: SourceOptions) -> RecordingSource:
         raise RecordingError(f'{path} does not exist: give a bag or a video file')
     if path.suffix.lower() in VIDEO_SUFFIXES:
         return VideoSource(path, options)
-    if path.is_dir() or path.suffix in {'.mcap', '.db3'}:
+    if is_recording(path):
         return BagSource(path, options)
     raise RecordingError(
-        f'{path} is neither a bag (folder, .mcap, .db3) nor a video '
+        f'{path} is neither a bag (folder, {", ".join(STORAGES)}) nor a video '
         f'({", ".join(VIDEO_SUFFIXES)}): give one of those'
     )
 
@@ -223,6 +248,10 @@ def _choose(
 ) -> str:
     if given is not None:
         bag.require(given, types)
+        if not bag.count(given):
+            raise RecordingError(
+                f'topic {given} of bag {bag.path} has 0 messages: choose another with {option}'
+            )
         return given
     found = [topic for topic in bag.find(types) if bag.count(topic)]
     for name in preferred:
@@ -234,17 +263,52 @@ def _choose(
     raise RecordingError(f'bag {bag.path}: {option} is not clear, there is {listed}: name one')
 
 
-def _poses(bag: BagReader, topic: str) -> list[Pose]:
-    try:
-        poses = [pose_from_message(message) for _, _, message in bag.messages([topic])]
-    except VehicleError as error:
-        raise RecordingError(f'bag {bag.path}: {error}') from error
+def _poses(bag: BagReader, topic: str, remarks: list[str]) -> list[Pose]:
+    """Return the poses in the order of their stamps; remark on those that cannot be used."""
+    poses: list[Pose] = []
+    faults: list[str] = []
+    for _, _, message in bag.messages([topic]):
+        try:
+            poses.append(pose_from_message(message))
+        except VehicleError as error:  # noqa: PERF203 (one bad pose among many)
+            faults.append(str(error))
+    if not poses:
+        raise RecordingError(
+            f'bag {bag.path}: none of {len(faults)} messages of {topic} is a pose; the first: '
+            f'{faults[0] if faults else "there is none"}: choose another with --pose-topic'
+        )
+    if faults:
+        remarks.append(f'{len(faults)} poses of {topic} left out; the first: {faults[0]}')
     poses.sort(key=lambda pose: pose.stamp_ns)
     return [
-        pose
-        for before, pose in zip([None, *poses[:-1]], poses, strict=True)
-        if before is None or pose.stamp_ns > before.stamp_ns
+        poses[0],
+        *(pose for before, pose in pairwise(poses) if pose.stamp_ns > before.stamp_ns),
     ]
+
+
+def _unstamped(bag: BagReader, topic: str, poses: list[Pose], remarks: list[str]) -> bool:
+    """Tell whether the images have no stamps, so that those of their receipt have to serve.
+
+    Raises:
+        RecordingError: images and poses are of different clocks.
+    """
+    first = next(iter(bag.messages([topic])), None)
+    if first is None:
+        return False
+    _, receipt_ns, message = first
+    unstamped = stamp_ns_of(message) == 0
+    if unstamped:
+        remarks.append(f'images of {topic} have the stamp 0: the time of their receipt is used')
+    stamp_ns = receipt_ns if unstamped else stamp_ns_of(message)
+    begin_ns, end_ns = poses[0].stamp_ns, poses[-1].stamp_ns
+    apart_s = max(begin_ns - stamp_ns, stamp_ns - end_ns) * 1e-9
+    if apart_s > _CLOCKS_APART_S:
+        raise RecordingError(
+            f'bag {bag.path}: poses are stamped {begin_ns * 1e-9:.1f} to {end_ns * 1e-9:.1f} s, '
+            f'the first image {stamp_ns * 1e-9:.1f} s, which never meet: record both with one '
+            'clock (synchronise the autopilot, or let the driver stamp in ROS time)'
+        )
+    return unstamped
 
 
 def _field_of_view(bag: BagReader, options: SourceOptions) -> float:

@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
 
+import onnx
 import pytest
 
 from peace_ros.core.domain import BundleError
@@ -74,6 +76,35 @@ def test_one_flipped_bit_is_found(clip_folder: Path) -> None:
     path.write_bytes(raw)
     with pytest.raises(BundleError, match=r'image_encoder\.onnx: SHA-256 [0-9a-f]{64}'):
         Bundle.load(clip_folder)
+
+
+@pytest.mark.parametrize('name', ['w.bin', 'weights-' + 'x' * 200 + '.bin'])
+def test_weights_outside_of_the_manifest_are_refused(clip_folder: Path, name: str) -> None:
+    """They could be replaced while every checksum stays right."""
+    path = clip_folder / 'image_encoder.onnx'
+    model = onnx.load(path)
+    tensor = model.graph.initializer[0]
+    raw = onnx.numpy_helper.to_array(tensor).tobytes()
+    tensor.ClearField('raw_data')
+    tensor.ClearField('float_data')
+    tensor.data_location = onnx.TensorProto.EXTERNAL
+    for key, value in (('location', name), ('offset', '0'), ('length', str(len(raw)))):
+        entry = tensor.external_data.add()
+        entry.key, entry.value = key, value
+    path.write_bytes(model.SerializeToString())
+    (clip_folder / name).write_bytes(raw)
+    _list_again(clip_folder, path.name)
+    with pytest.raises(BundleError, match=rf"keeps weights in '{name}', which the manifest"):
+        Bundle.load(clip_folder)
+    _list_again(clip_folder, name)
+    assert Bundle.load(clip_folder).manifest.files[name].bytes == len(raw)
+
+
+def _list_again(folder: Path, name: str) -> None:
+    raw, manifest = (folder / name).read_bytes(), folder / 'manifest.json'
+    content = json.loads(manifest.read_text())
+    content['files'][name] = {'sha256': hashlib.sha256(raw).hexdigest(), 'bytes': len(raw)}
+    manifest.write_text(json.dumps(content))
 
 
 WRONG = [

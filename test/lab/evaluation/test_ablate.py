@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +20,10 @@ from peace_ros.lab.evaluation.ablation.run import Counted, ablate
 from peace_ros.lab.evaluation.ablation.table import BEGIN, END, markdown, put_into
 from peace_ros.lab.evaluation.ablation.variants import DEFAULT, VOCABULARY, default_variants
 from peace_ros.lab.evaluation.segmentation.cores import Cores, Overrides, build_cores
+from peace_ros.lab.evaluation.segmentation.errors import DatasetError
 from peace_ros.lab.evaluation.segmentation.inputs import EvaluationInputs, open_source
 from peace_ros.lab.evaluation.segmentation.run import evaluate
+from peace_ros.lab.evaluation.segmentation.samples import Pair, Sample
 
 FRAMES = 3
 
@@ -31,6 +33,21 @@ def peace_cs() -> Cores:
     cores = build_cores('peace_cs', Overrides(threads=1))
     assert isinstance(cores, Cores)
     return cores
+
+
+@dataclass(frozen=True)
+class _Covered:
+    """A sample whose picture was taken with the lens covered."""
+
+    sample: Sample
+
+    @property
+    def name(self) -> str:
+        return self.sample.name
+
+    def load(self) -> Pair:
+        image, labels = self.sample.load()
+        return np.full_like(image, 90), labels
 
 
 @pytest.fixture(scope='module')
@@ -100,6 +117,20 @@ def test_other_families_are_refused(peace_cs: Cores) -> None:
     other = replace(peace_cs, segmentation=replace(peace_cs.segmentation, family='fastsam'))
     with pytest.raises(ConfigurationError, match='choose a preset of that family'):
         ablate(open_source(EvaluationInputs(drawn=1)), other, default_variants(1))
+
+
+def test_pictures_of_a_covered_lens_are_left_out_as_in_an_evaluation(peace_cs: Cores) -> None:
+    source = open_source(EvaluationInputs(drawn=2))
+    seen = source.samples[1]
+    covered = replace(source, samples=(_Covered(source.samples[0]), seen))
+    counted = ablate(covered, peace_cs, default_variants(1))
+    assert counted.frames == (seen.name,)
+    (left_out,) = counted.skipped
+    assert 'of one colour' in left_out.reason
+    with pytest.raises(DatasetError, match=r'of one colour .* \(--strict\)'):
+        ablate(covered, peace_cs, default_variants(1), strict=True)
+    with pytest.raises(DatasetError, match='no image could be scored'):
+        ablate(replace(covered, samples=covered.samples[:1]), peace_cs, default_variants(1))
 
 
 def test_the_command_writes_json_and_tables(tmp_path: Path) -> None:

@@ -151,6 +151,29 @@ def test_unknown_datasets_splits_and_folders_are_refused(tmp_path: Path) -> None
         dataset_source('vdd', tmp_path, 'val', 'ignore')
 
 
+@pytest.mark.parametrize(
+    'text',
+    [
+        '\ufeffimage,label\na.png,b.png\n',
+        'image;label\na.png;b.png\n',
+        'image, label\na.png , b.png\n',
+    ],
+    ids=['byte order mark', 'semicolons', 'blanks'],
+)
+def test_a_manifest_is_read_as_spreadsheets_write_it(tmp_path: Path, text: str) -> None:
+    for name in ('a.png', 'b.png'):
+        write(tmp_path / name, np.zeros((4, 4), np.uint8))
+    (tmp_path / 'manifest.csv').write_text(text, encoding='utf-8')
+    source = open_source(EvaluationInputs(manifest=tmp_path / 'manifest.csv'))
+    assert [each.name for each in source.samples] == ['a.png']
+
+
+def test_a_manifest_without_its_columns_tells_those_that_it_has(tmp_path: Path) -> None:
+    (tmp_path / 'manifest.csv').write_text('picture,label\na.png,b.png\n')
+    with pytest.raises(DatasetError, match='has the columns label, picture: give'):
+        open_source(EvaluationInputs(manifest=tmp_path / 'manifest.csv'))
+
+
 def test_a_manifest_gives_the_rows_of_a_split(tmp_path: Path) -> None:
     for stem in ('a', 'b'):
         write(tmp_path / f'{stem}.png', np.zeros((2, 2, 3), np.uint8))

@@ -170,6 +170,18 @@ def test_the_threshold_keeps_the_budget_with_the_highest_recall(
     assert choice.persons == 0.0
     lenient = choose_threshold(green_cores, tally, RiskBudget(0.9))
     assert lenient.recall == 1.0
+    # Not even a budget that allows everything gives a threshold that calls everything safe.
+    assert lenient.threshold > 149 / 255
+    assert lenient.false_safe < 0.5
+
+
+def test_a_threshold_that_is_as_good_as_any_stays(green_cores: Cores, pair_on_disk: Writer) -> None:
+    for place in range(6):
+        folders = pair_on_disk(f'f{place}', *scene(200, 100))
+    tally = run_green(green_cores, folders).tallies['green']
+    choice = choose_threshold(green_cores, tally, RiskBudget(0.01))
+    assert choice.threshold == pytest.approx(green_cores.standing)
+    assert choice.recall == 1.0
 
 
 def test_a_budget_that_no_threshold_keeps_is_refused(

@@ -91,6 +91,61 @@ def test_the_recorded_engagement_is_found(tmp_path) -> None:
     assert open_source(tmp_path / 'a.mcap', SourceOptions()).engage_ns == 3 * SECOND
 
 
+def test_a_pose_that_is_none_is_left_out_and_told(tmp_path) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        for k in range(1, 5):
+            turn = (0.0, 0.0, 0.0, 0.0) if k < 3 else LEVEL
+            bag.write('/pose', k * SECOND, pose_stamped(k * SECOND, (0, 0, 50), turn))
+            bag.write('/image', k * SECOND, jpeg_message(picture(9), k * SECOND))
+    source = open_source(tmp_path / 'a.mcap', SourceOptions())
+    assert [pose.stamp_ns for pose in source.poses] == [3 * SECOND, 4 * SECOND]
+    (remark,) = source.remarks
+    assert remark.startswith('2 poses of /pose left out; the first: pose (0.0, 0.0, 50.0)')
+
+
+def test_a_topic_without_a_pose_is_one_sentence(tmp_path) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        bag.add_topic('/empty', 'geometry_msgs/msg/PoseStamped')
+        bag.write('/pose', SECOND, pose_stamped(SECOND, (0, 0, 50), (0.0, 0.0, 0.0, 0.0)))
+        bag.write('/image', SECOND, jpeg_message(picture(9), SECOND))
+    with pytest.raises(RecordingError, match=r'/empty .* has 0 messages: choose .*--pose-topic'):
+        open_source(tmp_path / 'a.mcap', SourceOptions(pose_topic='/empty'))
+    with pytest.raises(RecordingError, match='none of 1 messages of /pose is a pose; the first'):
+        open_source(tmp_path / 'a.mcap', SourceOptions())
+
+
+def test_images_without_a_stamp_get_that_of_their_receipt(tmp_path) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        for k in range(1, 4):
+            bag.write('/pose', k * SECOND, pose_stamped(k * SECOND, (0, 0, 50), LEVEL))
+            bag.write('/image', k * SECOND, jpeg_message(picture(9 * k), 0))
+    source = open_source(tmp_path / 'a.mcap', SourceOptions())
+    taken = list(source.frames())
+    assert [each.frame.stamp_ns for each in taken] == [k * SECOND for k in (1, 2, 3)]
+    assert source.remarks == [
+        'images of /image have the stamp 0: the time of their receipt is used'
+    ]
+
+
+@pytest.mark.parametrize('shift_s', [-7200, 7200, 1_700_000_000])
+def test_clocks_that_never_meet_are_refused(tmp_path, shift_s) -> None:
+    at_ns = 10_000 * SECOND
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        bag.write('/pose', at_ns, pose_stamped(at_ns, (0, 0, 50), LEVEL))
+        bag.write('/image', at_ns, jpeg_message(picture(9), at_ns + shift_s * SECOND))
+    with pytest.raises(
+        RecordingError, match=r'poses are stamped 10000\.0 to 10000\.0 s.*one clock'
+    ):
+        open_source(tmp_path / 'a.mcap', SourceOptions())
+
+
+def test_poses_above_sea_level_are_put_above_ground(tmp_path) -> None:
+    path = write_bag(tmp_path / 'a.mcap')
+    pose = open_source(path, SourceOptions(ground_m=35.0)).poses[0]
+    assert pose.altitude_agl_m == pytest.approx(15.0)
+    assert pose.down_m == pytest.approx(-50.0)
+
+
 def test_a_video_gets_a_camera_and_an_altitude(tmp_path) -> None:
     with VideoWriter(tmp_path / 'a.mp4', 5.0) as video:
         for k in range(11):
@@ -99,6 +154,7 @@ def test_a_video_gets_a_camera_and_an_altitude(tmp_path) -> None:
     assert len(stamps(source)) == 11
     assert degrees(source.fov_x_rad) == pytest.approx(60.0)
     assert [source.poses[k].altitude_agl_m for k in (0, 5, 10)] == pytest.approx([80, 55, 30])
+    assert source.remarks == ['no altitude was recorded: 80:30 m is assumed, linear (--altitude)']
 
 
 @pytest.mark.parametrize('name', ['missing.mcap', 'notes.txt', 'folder', 'empty.mp4', 'empty.db3'])
@@ -114,7 +170,15 @@ def test_a_bad_source_is_one_sentence(tmp_path, name) -> None:
 
 
 @pytest.mark.parametrize(
-    'given', [{'every': 0}, {'hz': 0.0}, {'hz': float('nan')}, {'limit': 0}, {'fov_x_deg': 180.0}]
+    'given',
+    [
+        {'every': 0},
+        {'hz': 0.0},
+        {'hz': float('nan')},
+        {'limit': 0},
+        {'fov_x_deg': 180.0},
+        {'ground_m': float('nan')},
+    ],
 )
 def test_senseless_parts_are_refused(given) -> None:
     with pytest.raises(RecordingError, match='give'):

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import ConfigurationError, Frame
+from peace_ros.core.domain import ConfigurationError, Frame, ImageError
 from peace_ros.core.inference import Bundle, ClipEncoder
 from peace_ros.core.prompting import PromptGenerator, load_vocabularies
-from peace_ros.core.segmentation import FUSIONS
+from peace_ros.core.segmentation import FUSIONS, CameraWatch
 from peace_ros.core.segmentation.fusion import calibrated
 from peace_ros.lab.evaluation.ablation.features import (
     FeatureSegmenter,
@@ -23,6 +23,7 @@ from peace_ros.lab.evaluation.ablation.features import (
 )
 from peace_ros.lab.evaluation.ablation.variants import Variant
 from peace_ros.lab.evaluation.segmentation.cores import Cores
+from peace_ros.lab.evaluation.segmentation.errors import DatasetError
 from peace_ros.lab.evaluation.segmentation.histograms import BINS, LABELS, count_labels
 from peace_ros.lab.evaluation.segmentation.run import Watch, cut, fitted, readable
 from peace_ros.lab.evaluation.segmentation.samples import SampleSource, Skipped
@@ -105,6 +106,8 @@ def ablate(
 ) -> Counted:
     """Run every variant, with every fusion, over every image of a source.
 
+    Pictures that a flight refuses, such as those of a covered lens, are skipped here too.
+
     Args:
         source: labelled images.
         cores: of the family clipseg; its terms, bundles and vocabularies are used.
@@ -114,7 +117,7 @@ def ablate(
         watch: yields the samples, and may show the progress.
 
     Raises:
-        DatasetError: see :func:`readable`.
+        DatasetError: see :func:`readable`; a flight would refuse a tile and ``strict`` is given.
         ConfigurationError: the configuration is of another family.
     """
     bench = _Bench(cores, variants)
@@ -123,12 +126,28 @@ def ablate(
     names: list[str] = []
     counts: dict[Key, list[Counts]] = defaultdict(list)
     for name, (image, labels) in readable(source, skipped, strict=strict, watch=watch):
-        names.append(name)
         sums: dict[Key, Counts] = defaultdict(lambda: np.zeros((LABELS, BINS), np.uint32))
+        refused: list[str] = []
         for tile, frame in cut(image, tile_px):
+            try:
+                CameraWatch().check(frame)
+            except ImageError as error:
+                refused.append(str(error))
+                continue
             for key, each in bench.look(frame, tile.labels_of(labels)):
                 sums[key] += each
+        if refused and strict:
+            raise DatasetError(f'{name}: {refused[0]} (--strict)')
+        if refused:
+            skipped.append(Skipped(name, f'{len(refused)} tiles refused: {refused[0]}'))
+        if sums:
+            names.append(name)
         for key, each in sums.items():
             counts[key].append(each)
+    if not names:
+        raise DatasetError(
+            f'{source.title}: no image could be scored; the first of {len(skipped)}: '
+            f'{skipped[0].name}: {skipped[0].reason}'
+        )
     stacked = {key: np.stack(each) for key, each in counts.items()}
     return Counted(stacked, tuple(names), tuple(skipped), bench.segmenter.calls['image_encoder'])

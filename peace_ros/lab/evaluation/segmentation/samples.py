@@ -7,6 +7,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from io import StringIO
 from pathlib import Path
 from typing import Protocol
 
@@ -198,13 +199,13 @@ def manifest_source(manifest: Path, split: str, classes: str, mixed: str) -> Sam
 
     Raises DatasetError.
     """
-    try:
-        with manifest.open(newline='', encoding='utf-8') as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DatasetError(f'{manifest} cannot be read as CSV: {error}') from error
-    if not rows or not {'image', 'label'} <= set(rows[0]):
-        raise DatasetError(f'{manifest}: give rows with the columns image and label')
+    rows = _csv_rows(manifest)
+    columns = sorted(rows[0]) if rows else []
+    if not {'image', 'label'} <= set(columns):
+        raise DatasetError(
+            f'{manifest} has the columns {", ".join(columns) or "of no row"}: give rows with the '
+            'columns image and label'
+        )
     chosen = [row for row in rows if not split or row.get('split') == split]
     if not chosen:
         known = sorted({row.get('split') or '' for row in rows})
@@ -225,6 +226,21 @@ def manifest_source(manifest: Path, split: str, classes: str, mixed: str) -> Sam
         remarks=remarks,
         max_looks=_looks_of({row.get('dataset') or '' for row in chosen}),
     )
+
+
+def _csv_rows(path: Path) -> list[dict[str, str]]:
+    """Return the rows by column, also as spreadsheets write them (byte order mark, ;)."""
+    try:
+        text = path.read_text(encoding='utf-8-sig')
+        head = text.partition('\n')[0]
+        delimiter = max(',;\t', key=head.count)
+        table = csv.DictReader(StringIO(text, newline=''), delimiter=delimiter, restval='')
+        return [
+            {name.strip(): value.strip() for name, value in row.items() if isinstance(name, str)}
+            for row in table
+        ]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DatasetError(f'{path} cannot be read as CSV: {error}') from error
 
 
 def _looks_of(datasets: set[str]) -> int:

@@ -13,12 +13,16 @@ from numpy.typing import NDArray
 
 from peace_ros.core.domain import Label
 from peace_ros.core.inference.bundle import MANIFEST_NAME
+from peace_ros.core.inference.manifest import THRESHOLDS
 from peace_ros.lab.evaluation.segmentation.bootstrap import LEVEL, Bootstrap
 from peace_ros.lab.evaluation.segmentation.cores import Cores
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError
-from peace_ros.lab.evaluation.segmentation.histograms import BINS, edges
+from peace_ros.lab.evaluation.segmentation.histograms import BINS, MIDDLE, edges
 from peace_ros.lab.evaluation.segmentation.metrics import Areas, Array, ratio
 from peace_ros.lab.evaluation.segmentation.run import Tally
+
+_LEAST_GAIN = 0.002
+"""Of recall; less is not worth another threshold."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +69,14 @@ def choose_threshold(cores: Cores, tally: Tally, budget: RiskBudget) -> Choice:
     if budget.persons is not None:
         # Where nobody is in sight there is nothing to hold against a threshold.
         fits &= ~(persons_limits > budget.persons)
-    fits[0] = False
+    # What calls every pixel safe has seen nothing, whatever the budget.
+    fits &= (areas.safe_missed + areas.unsafe_kept > 0) & _usable(cores)
     if not fits.any():
         raise DatasetError(_refusal(areas, limits, budget, tally.frames))
-    at = int(np.flatnonzero(fits)[np.nan_to_num(areas.recall[fits]).argmax()])
+    recall = np.nan_to_num(areas.recall)
+    at = int(np.flatnonzero(fits)[recall[fits].argmax()])
+    if fits[MIDDLE] and recall[at] - recall[MIDDLE] < _LEAST_GAIN:
+        at = MIDDLE  # that of the bundle, so that choosing again changes nothing
     return Choice(
         cores.own_score(float(edges()[at])),
         float(areas.false_safe[at]),
@@ -78,6 +86,13 @@ def choose_threshold(cores: Cores, tally: Tally, budget: RiskBudget) -> Choice:
         float(persons[at]) if np.isfinite(persons[at]) else None,
         float(persons_limits[at]) if np.isfinite(persons_limits[at]) else None,
     )
+
+
+def _usable(cores: Cores) -> NDArray[np.bool_]:
+    """Return which edges of the bins are thresholds that a bundle may recommend."""
+    low, high = THRESHOLDS
+    usable = [low <= cores.own_score(float(each)) <= high for each in edges()[1:]]
+    return np.array([False, *usable], np.bool_)
 
 
 def _persons(counts: NDArray[np.float64]) -> Array:
