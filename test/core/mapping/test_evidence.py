@@ -224,3 +224,36 @@ def test_a_coarse_look_is_not_clear() -> None:
         heatmap = Heatmap(np.full((32, 32), 0.9, np.float32), time_s * S)
         safety_map.add(heatmap, CAMERA, pose)
         assert veto.clear_cells.any() == is_clear
+
+
+def one_look(safety_map: SafetyMap, north_m: float, value: float, stamp_ns: int) -> None:
+    pose = Pose(0, north_m, 0.0, -20.0, LEVEL, 20.0)
+    safety_map.add(Heatmap(np.full((32, 32), value, np.float32), stamp_ns), CAMERA, pose)
+
+
+def test_ground_that_enters_the_window_is_as_new_as_that_of_a_new_map() -> None:
+    moved, new = SafetyMap(DEFAULTS), SafetyMap(DEFAULTS)
+    one_look(moved, 0.0, 0.7, S)
+    for safety_map in (moved, new):
+        one_look(safety_map, 30.0, 0.6, 2 * S)
+    at = moved.layers(2 * S).cell_at(30.0, 0.0)
+    assert moved.layers(2 * S).score[at] == pytest.approx(new.layers(2 * S).score[at], abs=1e-6)
+
+
+def test_ages_are_exact_by_a_clock_that_began_long_ago() -> None:
+    begun_ns = 1_900_000_000 * S
+    safety_map = SafetyMap(DEFAULTS)
+    one_look(safety_map, 0.0, 0.7, begun_ns)
+    one_look(safety_map, 0.0, 0.7, begun_ns + S // 4)
+    layers = safety_map.layers(begun_ns + S // 2)
+    assert layers.age_s[layers.cell_at(0.0, 0.0)] == pytest.approx(0.25, abs=1e-4)
+
+
+def test_pixels_are_larger_on_the_ground_the_farther_aside_they_look() -> None:
+    safety_map = SafetyMap(DEFAULTS)
+    one_look(safety_map, 0.0, 0.7, S)
+    layers = safety_map.layers(S)
+    for north_m in (0.25, 5.25, 9.25):
+        pixel_m = 20.0 / CAMERA.focal_px * (1.0 + (north_m**2 + 0.25**2) / 20.0**2)
+        cell = layers.cell_at(north_m, 0.25)
+        assert safety_map._pixel_m[cell] == pytest.approx(pixel_m, rel=1e-3)
