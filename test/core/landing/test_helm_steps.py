@@ -238,6 +238,13 @@ def flown_to(steps: Steps, *, frames: int = 60) -> tuple[float, float]:
     return far_north, far_east
 
 
+def test_a_search_is_flown_around_where_the_landing_began() -> None:
+    steps = Steps(state=State.SEARCHING)
+    steps.step()
+    decision = steps.step(pose_of(60.0, 200.0, 0.0), later_s=6.0)
+    assert decision.setpoint.v_north_m_s < 0.0
+
+
 @pytest.mark.parametrize(('fence_m', 'flies'), [(0.0, True), (66.0, True), (64.0, False)])
 def test_a_search_turns_five_metres_before_the_fence(fence_m: float, flies: bool) -> None:
     parameters = replace(P, geofence_radius_m=fence_m)

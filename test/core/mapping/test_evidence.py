@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from peace_ros.core.domain import Camera, Heatmap, Pose
+from peace_ros.core.domain import Camera, Heatmap, ImageError, Pose
 from peace_ros.core.mapping import MapParameters, SafetyMap
 from peace_ros.core.mapping.projection import Window
 from peace_ros.core.mapping.veto import Veto
@@ -257,3 +257,14 @@ def test_pixels_are_larger_on_the_ground_the_farther_aside_they_look() -> None:
         pixel_m = 20.0 / CAMERA.focal_px * (1.0 + (north_m**2 + 0.25**2) / 20.0**2)
         cell = layers.cell_at(north_m, 0.25)
         assert safety_map._pixel_m[cell] == pytest.approx(pixel_m, rel=1e-3)
+
+
+@pytest.mark.parametrize('value', [-0.01, 1.01, float('nan')])
+def test_values_outside_of_0_to_1_change_nothing(value: float) -> None:
+    safety_map = SafetyMap(DEFAULTS)
+    one_look(safety_map, 0.0, 0.7, S)
+    one_look(safety_map, 0.0, 0.7, 2 * S)
+    assert safety_map.revision == 2
+    with pytest.raises(ImageError, match='within 0 to 1'):
+        one_look(safety_map, 0.0, value, 3 * S)
+    assert (safety_map.revision, safety_map.stamp_ns) == (2, 2 * S)
