@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from peace_ros.core.domain import Site, VehicleError
+from peace_ros.core.domain import Site, Telemetry, VehicleError
 from peace_ros.core.threads import GuardedThread, OnDefect
 from peace_ros.core.vehicle import VehicleLink
 
@@ -34,6 +34,12 @@ class AfterHandover:
         self._begun = False
         self._ended = threading.Event()
         self._due_s = 0.0
+        self._asking = False
+        self._refused = ''
+        self._landing_mode = ''
+        """Mode of the autopilot's landing, once it has begun."""
+        self.stage = ''
+        """What happens since the hand-over, in words; empty before it."""
 
     def follow(self, link: VehicleLink, site: Site | None, *, handed_over: bool) -> None:
         """Do what is due; never blocks.
@@ -45,14 +51,16 @@ class AfterHandover:
         """
         if not handed_over:
             self._begun = False
+            self._landing_mode = self._refused = self.stage = ''
             self._site = None
             self._ended.set()
             return
         self._site = site or self._site
+        self.stage = self._stage(link.telemetry(), taken_over=link.taken_over)
         if self._policy == 'landing_target':
             self._point(link)
         elif self._policy == 'land' and not self._begun:
-            self._begun, ended = True, threading.Event()
+            self._begun, self._asking, ended = True, True, threading.Event()
             self._ended = ended
             GuardedThread(
                 lambda: self._land(link, ended), 'after_handover', self._on_defect
@@ -75,7 +83,25 @@ class AfterHandover:
         except VehicleError as error:
             self._say(f'LANDING_TARGET was not sent: {error}')
 
+    def _stage(self, told: Telemetry, *, taken_over: bool) -> str:
+        mode = self._landing_mode
+        if told.landed:
+            return 'on the ground' if told.armed else 'on the ground, disarmed'
+        if not told.armed:
+            return 'disarmed'
+        if taken_over or not (told.mode == mode if mode else told.in_control or self._asking):
+            return f'mode {told.mode or "unknown"}: a pilot or a failsafe is in control'
+        if mode:
+            return f'LANDING by the autopilot in mode {mode}'
+        if self._asking:
+            return 'the autopilot is asked to land'
+        return 'hovering over a safe site' + (f'; {self._refused}' if self._refused else '')
+
     def _land(self, link: VehicleLink, ended: threading.Event) -> None:
+        self._request_land(link, ended)
+        self._asking = False
+
+    def _request_land(self, link: VehicleLink, ended: threading.Event) -> None:
         for _ in range(_ATTEMPTS):
             if ended.is_set():
                 return
@@ -85,8 +111,10 @@ class AfterHandover:
                 self._say(f'landing after the hand-over: {error}')
             else:
                 if result:
+                    self._landing_mode = link.telemetry().mode
                     self._say('handed over: the autopilot lands by itself')
                     return
-                self._say(f'landing after the hand-over {result.answer.value}: {result.reason}')
+                self._refused = f'landing {result.answer.value}: {result.reason}'
+                self._say(f'handed over; {self._refused}')
             if ended.wait(_PAUSE_S):
                 return

@@ -75,9 +75,10 @@ class LandingNode(PeaceNode):
             decision = self._core.step(at_ns, told, age_s)
             self._submit(decision)
         sender = '' if self._sender is None else self._sender.statistics().state.value
-        situation = VehicleSituation(told, age_s, self._access.problem, sender, link)
+        access = self._access
+        situation = VehicleSituation(told, age_s, access.problem, sender, access.stage, link)
         self._publisher.publish(decision, situation, at_ns)
-        self._access.follow(decision)
+        access.follow(decision)
         self._engagement.engage_when_ready()
 
     def _telemetry(self) -> tuple[Telemetry | None, float]:

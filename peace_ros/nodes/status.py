@@ -47,6 +47,8 @@ class VehicleSituation:
     """Why the vehicle cannot be reached, empty when it can."""
     sender: str = ''
     """What the timed sender does."""
+    stage: str = ''
+    """What happens since the hand-over, empty before it."""
     line: VehicleLink | None = None
     """Once the vehicle is reached: what its line warns of, and what it has not used."""
 
@@ -90,7 +92,8 @@ class DecisionPublisher:
 def status_message(decision: Decision, situation: VehicleSituation, at_ns: int) -> DiagnosticArray:
     """Return the status; a vehicle that cannot be reached is a HOLD, whatever was decided."""
     state = State.HOLD if situation.problem else decision.state
-    reason = situation.problem or decision.reason
+    after = f'handed over: {situation.stage}' if situation.stage else ''
+    reason = situation.problem or (after if state is State.HANDOVER else '') or decision.reason
     level = ERROR if state is State.ABORTED else WARN if state in _CONCERNING else OK
     told = situation.telemetry
     pairs = {
@@ -113,6 +116,7 @@ def _telemetry_pairs(told: Telemetry) -> dict[str, str]:
         'in_control': _truth(told.in_control),
         'landed': _truth(told.landed),
         'status_text': told.status_text,
+        'explanation': told.explanation,
     }
 
 

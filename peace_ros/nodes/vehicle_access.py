@@ -95,6 +95,11 @@ class VehicleAccess:
             return self.problem
         return link.problem or link.position_problem
 
+    @property
+    def stage(self) -> str:
+        """What the vehicle does since the hand-over, empty before it."""
+        return self._after.stage
+
     def follow(self, decision: Decision) -> None:
         """Report our health to the vehicle, and do what follows a hand-over; once per step."""
         link = self.link
@@ -131,7 +136,10 @@ class VehicleAccess:
     def stop_vehicle(self) -> None:
         """Send zero velocity, if the vehicle still obeys us."""
         link = self.link
-        if link is None or link.taken_over or not link.telemetry().in_control:
+        if link is None or link.taken_over:
+            return
+        told = link.telemetry()
+        if not (told.in_control and told.mode_known):
             return
         try:
             for _ in range(_LAST_ZEROS):

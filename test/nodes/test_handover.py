@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -22,14 +23,20 @@ class Link:
         self.asked = 0
         self.answers = [Answer.ACCEPTED]
 
+        self.told = Telemetry(0, POSE, armed=True, in_control=True, mode='GUIDED')
+        self.taken_over = False
+        self.lands_in = ''
+
     def telemetry(self) -> Telemetry:
-        return Telemetry(0, POSE)
+        return self.told
 
     def send_landing_target(self, site: tuple[float, float, float], _pose: Pose) -> None:
         self.targets.append(site)
 
     def request_land(self) -> RequestResult:
         self.asked += 1
+        if self.lands_in:
+            self.told = replace(self.told, mode=self.lands_in, in_control=False)
         return RequestResult(self.answers.pop(0) if self.answers else Answer.REFUSED, 'no')
 
 
@@ -72,3 +79,92 @@ def test_landing_targets_flow_at_ten_hertz_and_lie_on_the_ground() -> None:
     assert 3 <= len(link.targets) <= 7
     assert set(link.targets) == {(4.0, -3.0, 0.0)}
     assert link.asked == 0
+
+
+LANDED = 'on the ground'
+CONTROLLED = 'a pilot or a failsafe is in control'
+
+
+@pytest.mark.parametrize('policy', ['hold', 'landing_target'])
+@pytest.mark.parametrize(
+    ('changes', 'stage'),
+    [
+        ({}, 'hovering over a safe site'),
+        ({'in_control': False, 'mode': 'LOITER'}, f'mode LOITER: {CONTROLLED}'),
+        ({'landed': True}, LANDED),
+        ({'landed': True, 'armed': False}, f'{LANDED}, disarmed'),
+        ({'armed': False}, 'disarmed'),
+    ],
+)
+def test_the_stage_of_a_vehicle_that_holds(policy, changes, stage) -> None:
+    link, after = Link(), AfterHandover(policy, lambda _: None)
+    assert after.stage == ''
+    link.told = replace(link.told, **changes)
+    after.follow(link, SITE, handed_over=True)
+    assert after.stage == stage
+
+
+def landing(link: Link, *tellings: dict[str, object]) -> list[str]:
+    """The stages while the vehicle lands and reports one after the other."""
+    after, stages = AfterHandover('land', lambda _: None), []
+    until = time.monotonic() + 2.0
+    while not after.stage.startswith('LANDING') and time.monotonic() < until:
+        after.follow(link, SITE, handed_over=True)
+        time.sleep(0.01)
+    for changes in tellings:
+        link.told = replace(link.told, **changes)
+        after.follow(link, SITE, handed_over=True)
+        stages.append(after.stage)
+    after.end()
+    return stages
+
+
+def test_the_stages_of_a_landing_to_the_ground() -> None:
+    link = Link()
+    link.lands_in = 'LAND'
+    assert landing(link, {}, {'landed': True}, {'armed': False}) == [
+        'LANDING by the autopilot in mode LAND',
+        LANDED,
+        f'{LANDED}, disarmed',
+    ]
+
+
+def test_a_pilot_who_takes_over_the_landing_is_seen() -> None:
+    link = Link()
+    link.lands_in = 'LAND'
+    stages = landing(link, {}, {'mode': 'LOITER'})
+    assert stages[-1] == f'mode LOITER: {CONTROLLED}'
+
+
+def test_a_pilot_who_takes_over_before_the_landing_is_seen() -> None:
+    link = Link()
+    link.answers = []
+    link.taken_over = True
+    after = AfterHandover('land', lambda _: None)
+    link.told = replace(link.told, mode='LOITER', in_control=False)
+    after.follow(link, SITE, handed_over=True)
+    assert after.stage == f'mode LOITER: {CONTROLLED}'
+    after.end()
+
+
+def test_a_landing_that_is_refused_for_good_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('peace_ros.nodes.handover._PAUSE_S', 0.01)
+    link, after = Link(), AfterHandover('land', lambda _: None)
+    link.answers = []
+    until = time.monotonic() + 2.0
+    while 'refused' not in after.stage and time.monotonic() < until:
+        after.follow(link, SITE, handed_over=True)
+        time.sleep(0.01)
+    assert after.stage == 'hovering over a safe site; landing refused: no'
+
+
+def test_a_landing_that_is_asked_for_is_not_a_pilot() -> None:
+    link, said = Link(), []
+    link.answers = []
+    after = AfterHandover('land', said.append)
+    after.follow(link, SITE, handed_over=True)
+    link.told = replace(link.told, in_control=False, mode='LAND')
+    after.follow(link, SITE, handed_over=True)
+    assert after.stage == 'the autopilot is asked to land'
+    after.follow(link, SITE, handed_over=False)
+    assert after.stage == ''

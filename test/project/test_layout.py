@@ -11,8 +11,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'peace_ros'
-LINES_OF_WHAT_FLIES = 14_900
-"""Of core and nodes: 14,500, and what learns a biased velocity and finds faulty axes."""
+LINES_OF_WHAT_FLIES = 15_300
+"""Of core and nodes: 14,500, what learns a biased velocity and finds faulty axes, and what names
+the cause that stops the vehicle (fence, second commander, failsafe after a silent line)."""
 LINES_OF_A_NODE_FILE = 200
 
 

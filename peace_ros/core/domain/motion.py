@@ -67,6 +67,15 @@ class Telemetry:
     position_problem: str = ''
     """Why what it said of its position is not believed; empty while it is, and before it said
     anything."""
+    mode_known: bool = True
+    """The mode was reported after the last silence of the line that may have changed it."""
+    fence: str = ''
+    """What a fence of the autopilot does to the vehicle now; empty when nothing is reported."""
+    other_commander: str = ''
+    """Who else commands the vehicle by set-points; empty when nobody was seen."""
+    explanation: str = ''
+    """What the autopilot reports that may explain why the vehicle does not follow, or why it left
+    our mode: fence, battery, STATUSTEXT; empty when it reports nothing."""
 
 
 @dataclass(frozen=True)

@@ -182,9 +182,10 @@ class ExpandingSquare:
     def _begin(self) -> None:
         self._leg = 0
         self._north, self._east = self._home
-        self._advance()
+        self.advance()
 
-    def _advance(self) -> None:
+    def advance(self) -> None:
+        """Go on to the next way-point: this one is reached, or cannot be."""
         turn_north, turn_east = self._TURNS[self._leg % 4]
         length = (self._leg // 2 + 1) * self._spacing_m
         self._north += turn_north * length
@@ -194,7 +195,7 @@ class ExpandingSquare:
     def target(self, pose: Pose) -> tuple[float, float]:
         """Return the way-point to fly to from here (north, east), within the radius of home."""
         if hypot(self._north - pose.north_m, self._east - pose.east_m) <= self._ARRIVED_M:
-            self._advance()
+            self.advance()
         if hypot(self._north - self._home[0], self._east - self._home[1]) > self._radius_m:
             self._begin()
             if self._spacing_m > self._radius_m:

@@ -12,6 +12,7 @@ from dataclasses import replace
 from math import hypot, inf
 
 from peace_ros.core.domain import Pose, Setpoint, Telemetry
+from peace_ros.core.landing.blockade import Blockade
 from peace_ros.core.landing.decision import Decision
 from peace_ros.core.landing.drift import Drift
 from peace_ros.core.landing.guard import Guard
@@ -53,6 +54,7 @@ class Helm:
         self._guard = Guard(self._p)
         self._control = ControlWatch()
         self._drift = Drift()
+        self._blockade = Blockade()
         self._told = Setpoint(0)
         self._budget = Budget(self._p)
         self._home: Pose | None = None
@@ -83,7 +85,7 @@ class Helm:
 
     def fail_attempt(self) -> None:
         """Count a descent that failed."""
-        self._budget.fail_attempt()
+        self._budget.fail_attempt(self._reason)
 
     @property
     def attempts(self) -> int:
@@ -127,7 +129,9 @@ class Helm:
         self._advance(situation, self._events(situation, bad_data))
         situation = replace(situation, search_target=self._search_target(situation))
         wish, note = velocity(self.state, situation, p)
-        self._drift.see(pose, self._told)
+        # What a fence takes from the speed is no drift.
+        fenced = telemetry is not None and telemetry.fence != ''
+        self._drift.see(None if fenced else pose, self._told)
         wish = self._drift.made_up(wish, self._lateral_limit_m_s(pose))
         setpoint, guard_notes = self._guard.limit(wish, situation)
         self._told = setpoint
@@ -157,6 +161,7 @@ class Helm:
 
     def _keep_books(self, situation: Situation, telemetry: Telemetry | None, bad_data: str) -> None:
         self._control.see(telemetry)
+        self._blockade.see(situation.now_ns, None if bad_data else telemetry, self._told)
         looking = self.state in LOOKING and not bad_data
         site_known = situation.site is not None
         self._budget.spend(situation.now_ns, telemetry, looking=looking, site_known=site_known)
@@ -186,6 +191,7 @@ class Helm:
             taken_over=self._control.taken_over,
             out_of_budget=self._budget.reason,
             policy_open=self._budget.policy_open,
+            blocked=self._blockade.reason,
             bad_data=bad_data,
             site_known=site is not None,
             warmed_up=seen >= p.sensor_warm_up_cycles,
@@ -210,6 +216,7 @@ class Helm:
         if state is not before:
             self.state, self._since_ns = state, now_ns
             self._revision_at_state = situation.sighting.revision
+            self._blockade.forget()
 
     def _search_target(self, situation: Situation) -> tuple[float, float] | None:
         p, pose, best = self._p, situation.pose, situation.sighting.best
@@ -225,6 +232,9 @@ class Helm:
                 radius_m = min(radius_m, max(0.0, p.geofence_radius_m - _FENCE_MARGIN_M))
             around = (home.north_m, home.east_m)
             self._square = ExpandingSquare(around, p.search_spacing_m, radius_m)
+        if self._blockade.reason:
+            self._square.advance()
+            self._blockade.forget()
         return self._square.target(pose)
 
 

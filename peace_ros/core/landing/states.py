@@ -60,6 +60,8 @@ class Events:
     """Which budget is used up; empty while there is time, battery, way and attempts."""
     policy_open: bool = False
     """The policy for a used-up budget still has something to do before it holds."""
+    blocked: str = ''
+    """Why the vehicle does not get farther: a fence of the autopilot; empty while it may."""
     bad_data: str = ''
     """What is missing, old or wrong; empty when data can be trusted."""
     site_known: bool = False
@@ -120,7 +122,7 @@ GUARDS: tuple[Rule, ...] = (
         'in ABORTED, in every case',
         lambda s, _e, _t, _p: s is State.ABORTED,
         State.ABORTED,
-        'aborted: engage again to continue',
+        'aborted, engage again to continue: {taken_over}',
     ),
     Rule('disengaged', lambda _s, e, _t, _p: not e.engaged, State.IDLE, 'not engaged'),
     Rule(
@@ -162,6 +164,12 @@ _LOST = Rule(
     State.WAITING,
     'the site is lost: waiting for it',
 )
+_FENCED = Rule(
+    'a fence of the autopilot stops the vehicle',
+    lambda _s, e, _t, _p: bool(e.blocked),
+    State.CLIMBING,
+    '{blocked}: climbing to look for another site',
+)
 _NO_SITE_BELOW = Rule(
     'no SITE below the safe altitude for {giveup_after_s} s',
     lambda _s, e, t, p: not e.site_known and not e.at_safe_altitude and t >= p.giveup_after_s,
@@ -191,6 +199,13 @@ RULES: dict[State, tuple[Rule, ...]] = {
             'over the site: descending',
         ),
         Rule(
+            'a fence of the autopilot stops the vehicle, at the safe altitude',
+            lambda _s, e, _t, _p: bool(e.blocked) and e.at_safe_altitude,
+            State.RESTARTING,
+            '{blocked}: looking for another site',
+        ),
+        _FENCED,
+        Rule(
             'for {max_aiming_s} s, below the safe altitude',
             lambda _s, e, t, p: t >= p.max_aiming_s and not e.at_safe_altitude,
             State.CLIMBING,
@@ -212,6 +227,7 @@ RULES: dict[State, tuple[Rule, ...]] = {
             State.HANDOVER,
             'at the hand-over altitude over a safe site',
         ),
+        _FENCED,
         Rule(
             'for {max_landing_s} s',
             lambda _s, _e, t, p: t >= p.max_landing_s,
@@ -245,6 +261,12 @@ RULES: dict[State, tuple[Rule, ...]] = {
             lambda _s, e, _t, _p: e.at_safe_altitude,
             State.RESTARTING,
             'at the safe altitude: looking for another site',
+        ),
+        Rule(
+            'a fence of the autopilot stops the vehicle',
+            lambda _s, e, _t, _p: bool(e.blocked),
+            State.RESTARTING,
+            '{blocked}: looking for another site from here',
         ),
     ),
     State.RESTARTING: (
@@ -293,5 +315,5 @@ def next_state(
             return rule.target, rule.reason.format_map(vars(events))
     for rule in RULES[state]:
         if rule.holds(state, events, time_in_state_s, parameters):
-            return rule.target, rule.reason
+            return rule.target, rule.reason.format_map(vars(events))
     return state, ''

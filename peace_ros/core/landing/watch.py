@@ -10,6 +10,8 @@ from peace_ros.core.domain import Pose, Telemetry
 from peace_ros.core.landing.parameters import LandingParameters
 
 _NS = 1e-9
+_EXPLAINED_NS = 2_000_000_000
+"""How long after a takeover the autopilot may report what explains it."""
 _AT_ALTITUDE = 0.98
 """An altitude counts as reached at this part of it."""
 
@@ -34,20 +36,32 @@ class ControlWatch:
 
     def __init__(self) -> None:
         self._had_control = self._was_armed = False
-        self.taken_over = ''
+        self._what = self._why = ''
+        self._lost_ns = 0
+
+    @property
+    def taken_over(self) -> str:
         """Why we are no longer in control of the vehicle; once set, it stays."""
+        return f'{self._what} (the autopilot reports: {self._why})' if self._why else self._what
 
     def see(self, telemetry: Telemetry | None) -> None:
         """Check telemetry, even old: a take-over that was reported once counts."""
-        if telemetry is None or self.taken_over:
+        if telemetry is None:
+            return
+        if self._what:
+            # What explains it may come a moment later.
+            if not self._why and telemetry.received_ns - self._lost_ns < _EXPLAINED_NS:
+                self._why = telemetry.explanation
             return
         if self._had_control and not telemetry.in_control:
-            self.taken_over = (
+            self._what = (
                 f'the autopilot changed to mode {telemetry.mode or "unknown"} without our request: '
                 'a pilot or a failsafe is in control'
             )
         elif self._was_armed and not telemetry.armed:
-            self.taken_over = 'the vehicle was disarmed'
+            self._what = 'the vehicle was disarmed'
+        if self._what:
+            self._why, self._lost_ns = telemetry.explanation, telemetry.received_ns
         self._had_control |= telemetry.in_control and telemetry.armed
         self._was_armed |= telemetry.armed
 
@@ -78,9 +92,13 @@ def bad_vehicle(telemetry: Telemetry | None, age_s: float, parameters: LandingPa
 def bad_telemetry(telemetry: Telemetry | None, age_s: float, parameters: LandingParameters) -> str:
     """Return why set-points must stop for what telemetry says, empty when they may go on."""
     problem = bad_vehicle(telemetry, age_s, parameters)
-    if not problem and telemetry is not None and not telemetry.in_control:
+    if problem or telemetry is None:
+        return problem
+    if not telemetry.in_control:
         return f'the autopilot is in mode {telemetry.mode or "unknown"}, in which it ignores us'
-    return problem
+    if not telemetry.mode_known:
+        return 'the connection was silent: nothing is sent until the autopilot reports its mode'
+    return telemetry.other_commander
 
 
 def bad_map(map_age_s: float, last_rejection: str, parameters: LandingParameters) -> str:
@@ -107,6 +125,7 @@ class Budget:
         self._last_at: tuple[float, float] | None = None
         self._ever_site = False
         self._policy_done = False
+        self._failed_because = ''
         self.without_site_s = 0.0
         """Time in search since a site was last known."""
         self.search_m = 0.0
@@ -136,9 +155,10 @@ class Budget:
             self.outcome, self.reason = self._used_up(telemetry)
             self._spent_ns = self._last_ns
 
-    def fail_attempt(self) -> None:
+    def fail_attempt(self, why: str = '') -> None:
         """Count a descent that failed; once a budget is used up there is no further one."""
         self.attempts += 1
+        self._failed_because = f' (the last: {why})' if why else ''
         if self.outcome:
             self.finish_policy()
 
@@ -165,7 +185,8 @@ class Budget:
         total_s = (self._last_ns - (self._begun_ns or 0)) * _NS
         battery = None if telemetry is None else telemetry.battery_remaining
         if self.attempts >= p.max_attempts:
-            return 'no_zone', f'{self.attempts} descents failed, limit {p.max_attempts}'
+            failed = f'{self.attempts} descents failed, limit {p.max_attempts}'
+            return 'no_zone', failed + self._failed_because
         if self.without_site_s > p.max_search_s:
             return 'no_zone', f'no safe place was found in {p.max_search_s:.0f} s of searching'
         if self.search_m > p.search_distance_m:

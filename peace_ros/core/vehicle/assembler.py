@@ -19,6 +19,7 @@ from peace_ros.core.vehicle.dialects import Dialect
 from peace_ros.core.vehicle.gnss import GnssWatch
 from peace_ros.core.vehicle.heights import MAX_EXTRAPOLATION_S, Height, HomeHeight, height_of
 from peace_ros.core.vehicle.parameters import VehicleParameters
+from peace_ros.core.vehicle.stops import MESSAGES, Stops
 from peace_ros.core.vehicle.texts import StatusTexts
 from peace_ros.core.vehicle.trust import JumpWatch, Pairwise, PoseReport
 
@@ -107,6 +108,7 @@ class Assembler:
         self._estimator: tuple[int, int, int] | None = None
         """Steady clock, flags, flags of the report before."""
         self._gnss = GnssWatch()
+        self.stops = Stops()
         self.landed_state = 0
         self.arrived_ns.clear()
         self._watch.forget()
@@ -190,6 +192,9 @@ class Assembler:
             received_ns=self._received_ns,
             pose=pose,
             position_problem=problem,
+            fence=self.stops.fence(steady_ns),
+            other_commander=self.stops.other_commander(steady_ns),
+            explanation=self.stops.explanation(steady_ns),
             v_north_m_s=velocity[0],
             v_east_m_s=velocity[1],
             v_down_m_s=velocity[2],
@@ -362,6 +367,12 @@ class Assembler:
 
     def _text(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
         self.texts.take(m, steady_ns)
+        whole = bool(self.texts.entries) and self.texts.entries[-1][0] == steady_ns
+        if whole and m.severity <= mavlink.MAV_SEVERITY_WARNING:
+            self.stops.take_text(self.texts.newest, steady_ns)
+
+    def _take_stop(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
+        self.stops.take(m, steady_ns)
 
 
 def _size(m: Any) -> float:
@@ -401,4 +412,5 @@ _HANDLERS = {
     'EKF_STATUS_REPORT': Assembler._estimate,  # noqa: SLF001
     'ESTIMATOR_STATUS': Assembler._estimate,  # noqa: SLF001
     'STATUSTEXT': Assembler._text,  # noqa: SLF001
+    **dict.fromkeys(MESSAGES, Assembler._take_stop),  # noqa: SLF001
 }

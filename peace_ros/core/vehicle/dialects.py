@@ -52,6 +52,9 @@ class Dialect(ABC):
     """Mode in which it keeps its height, level, without a position; empty: it has none."""
     home_is_local: bool = False
     """HOME_POSITION tells where home is in the local frame, not only on the globe."""
+    silence_limit_s: float = 0.0
+    """After so long without any message it may have left our mode, and set-points would bring it
+    back: nothing is sent until it reports its mode. 0: set-points cannot change its mode."""
     heartbeat_rate_hz: float = 0.0
     """Rate of HEARTBEAT to ask for; 0: a new mode is told at once anyway."""
 
@@ -179,6 +182,7 @@ class Px4(Dialect):
     estimator_message: int = 230
     height_message: int = mavlink.MAVLINK_MSG_ID_ALTITUDE
     home_is_local: bool = True
+    silence_limit_s: float = 0.9
     heartbeat_rate_hz: float = 5.0
 
     def mode_name(self, custom_mode: int) -> str:

@@ -38,7 +38,7 @@ class VehicleLink(Protocol):
 
     @property
     def warning(self) -> str:
-        """What a person should know of the line, empty when nothing."""
+        """What a person should know of the line and the vehicle, empty when nothing."""
 
     @property
     def counts(self) -> LineCounts:

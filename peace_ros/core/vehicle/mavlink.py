@@ -125,13 +125,15 @@ class MavlinkLink:
     def position_problem(self) -> str:
         """Why the autopilot will not obey velocities now, empty when nothing speaks against it."""
         with self._changed:
-            found = self._heard().position_problem(time.monotonic_ns())
-            return found or self._obedience.problem
+            now_ns = time.monotonic_ns()
+            return self._heard().position_problem(now_ns) or self._disobedience(now_ns)
 
     @property
     def warning(self) -> str:
-        """What a person should know of the line, empty when nothing."""
-        return '; '.join(each for each in (self._peer.warning, self._wire.warning) if each)
+        """What a person should know of the line and the vehicle, empty when nothing."""
+        with self._changed:
+            battery = self._heard().stops.battery(time.monotonic_ns())
+        return '; '.join(filter(None, (self._peer.warning, self._wire.warning, battery)))
 
     @property
     def counts(self) -> LineCounts:
@@ -155,8 +157,10 @@ class MavlinkLink:
     def telemetry(self) -> Telemetry:
         """Return what the autopilot last said."""
         with self._changed:
-            told = self._heard().telemetry(time.monotonic_ns())
-            problem = self._obedience.problem
+            now_ns = time.monotonic_ns()
+            told = self._heard().telemetry(now_ns)
+            told = replace(told, mode_known=self._control.mode_known(now_ns))
+            problem = self._disobedience(now_ns)
             return replace(told, pose=None, position_problem=problem) if problem else told
 
     def take_poses(self) -> list[Pose]:
@@ -190,7 +194,9 @@ class MavlinkLink:
                 f'velocity set-point {v} m/s: all components must be finite; nothing was sent'
             )
         self._zero_until_ns = 0
-        self._obedience.tell(v)
+        with self._changed:
+            self._obedience.tell(v)
+            self._heard().stops.tell(v, time.monotonic_ns())
         self._send_setpoint(setpoint)
 
     def send_landing_target(self, site_ned_m: tuple[float, float, float], pose: Pose) -> None:
@@ -240,10 +246,11 @@ class MavlinkLink:
         heard, dialect = self._assembler, self._dialect
         if heard is None or dialect is None or self.taken_over:
             return False
-        if heard.mode != dialect.control_mode:
+        now_ns = time.monotonic_ns()
+        if heard.mode != dialect.control_mode or not self._control.mode_known(now_ns):
             return False
         limit_ns = int(self._parameters.request_limit_s * 1e9)
-        self._control.leave_to(dialect.hold_mode, time.monotonic_ns() + limit_ns)
+        self._control.leave_to(dialect.hold_mode, now_ns + limit_ns)
         self._send_setpoint(Setpoint(stamp_ns=0))
         mode = (*dialect.mode_command(dialect.hold_mode), 0.0, 0.0, 0.0, 0.0)
         command = mavlink.MAV_CMD_DO_SET_MODE
@@ -369,12 +376,20 @@ class MavlinkLink:
         self._obedience_due_ns = now_ns + OBEDIENCE_NS
         with self._changed:
             told = heard.telemetry(now_ns)
-            if not told.in_control:
+            # What a fence or a second commander does proves nothing; a doubt of before stays.
+            stopped = told.other_commander or heard.stops.limits_speed(now_ns)
+            if not told.in_control or (stopped and not self._obedience.problem):
                 self._obedience.forget()
             at = told.pose
             position_m = None if at is None else (at.north_m, at.east_m, -at.altitude_agl_m)
             reported_ns = heard.arrived_ns.get(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 0)
             self._obedience.take(position_m, reported_ns, heard.reported_ns)
+
+    def _disobedience(self, now_ns: int) -> str:
+        """Return that the vehicle does not follow, with what may explain it; empty when it does."""
+        problem = self._obedience.problem
+        why = self._heard().stops.hindrance(now_ns) if problem else ''
+        return f'{problem} (the autopilot reports: {why})' if why else problem
 
     def _begin_anew(self) -> None:
         self._openings = self._transport.openings
@@ -391,6 +406,7 @@ class MavlinkLink:
                 return
             assembler = self._heard()
             self._requests.take(message)
+            self._control.hear(now_ns, is_mode=message.get_type() == 'HEARTBEAT')
             if message.get_type() == 'TIMESYNC':
                 self._house.take_time(message)
             was_control = assembler.mode == self.dialect.control_mode
@@ -419,6 +435,7 @@ class MavlinkLink:
             return False
         self._peer.choose(message, source, now_ns)
         self._house.streams = StreamKeeper(self._parameters, self._dialect)
+        self._control = Control(self._dialect.silence_limit_s)
         self._assembler = Assembler(self._dialect, self._parameters, self._clock)
         return True
 
@@ -433,6 +450,8 @@ class MavlinkLink:
             requests = self._house.requests(now_ns, self._assembler, self._peer.target)
         for request in requests:
             self._send(request)
+        if not self._control.mode_known(now_ns):
+            self._zero_until_ns = 0
         flowing = self._holding_level or now_ns < self._zero_until_ns
         if not flowing or now_ns < self._stream_due_ns:
             return

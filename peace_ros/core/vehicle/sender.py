@@ -4,7 +4,8 @@
 
 Fresh set-point -> it is sent; the first that stops the vehicle at once, the others in turn.
 Before it is ``limit_s`` old -> zero velocity. Older than ``limit_s`` plus ``handover_s`` -> the
-autopilot is asked, once, for its own hold mode. Not in control -> silence.
+autopilot is asked, once, for its own hold mode. Not in control, or the mode not known after a
+silence of the line -> silence.
 
 The state is as fresh as the thread: a thread that no longer runs says so, whatever it did last.
 """
@@ -41,6 +42,7 @@ class SenderState(Enum):
     ZERO = 'the newest set-point is too old: sending zero'
     HANDED_OVER = 'the autopilot holds by itself'
     NOT_IN_CONTROL = 'the autopilot obeys somebody else: silent'
+    MODE_UNKNOWN = 'the connection was silent: nothing is sent until the mode is known'
     STOPPED = 'stopped'
     STUCK = 'the thread of the sender does not run'
 
@@ -55,7 +57,7 @@ class SenderStatistics:
     zeros: int = 0
     """Zero set-points of the dead-man."""
     withheld: int = 0
-    """Ticks at which somebody else controlled the autopilot."""
+    """Ticks at which somebody else controlled the autopilot, or perhaps did."""
     errors: int = 0
     last_error: str = ''
     max_gap_s: float = 0.0
@@ -193,9 +195,12 @@ class SetpointSender:
         """Do what is due now; the thread calls it, tests may."""
         # Under the lock of sending, so that nothing leaves once stop() has returned.
         with self._sending:
-            in_control = not self._link.taken_over and self._link.telemetry().in_control
+            told = self._link.telemetry()
+            silent: SenderState | None = SenderState.NOT_IN_CONTROL
+            if not self._link.taken_over and told.in_control:
+                silent = None if told.mode_known else SenderState.MODE_UNKNOWN
             with self._lock:
-                setpoint, self._state = self._choose(in_control=in_control)
+                setpoint, self._state = self._choose(silent)
                 state, ask_hold = self._state, self._is_hold_due()
                 if setpoint is None:
                     self._last_sent_ns = None
@@ -212,16 +217,17 @@ class SetpointSender:
         self._hold_asked = self._steady_ns() - self._submitted_ns > self._handover_ns
         return self._hold_asked
 
-    def _choose(self, *, in_control: bool) -> tuple[Setpoint | None, SenderState]:
+    def _choose(self, silent: SenderState | None) -> tuple[Setpoint | None, SenderState]:
+        """Return what to send, None when ``silent`` or something else speaks against it."""
         if self._stop.is_set():
             return None, SenderState.STOPPED
         if self._newest is None:
             return None, SenderState.IDLE
         if self._handed_over:
             return None, SenderState.HANDED_OVER
-        if not in_control:
+        if silent is not None:
             self._withheld += 1
-            return None, SenderState.NOT_IN_CONTROL
+            return None, silent
         age_ns = self._steady_ns() - self._submitted_ns
         if 0 <= age_ns <= self._limit_ns:
             return self._newest, SenderState.SENDING

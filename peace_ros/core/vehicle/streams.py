@@ -13,14 +13,25 @@ from peace_ros.core.vehicle.parameters import VehicleParameters
 SILENT_NS = 1_500_000_000
 """A stream that is silent for so long is asked for again."""
 ASK_AGAIN_NS = 1_000_000_000
+MAYBE_AGAIN_NS = 15_000_000_000
 ONCE_AGAIN_NS = 3_000_000_000
 HEALTH_HZ = 1.0
 HEIGHT_HZ = 10.0
 ESTIMATOR_HZ = 4.0
 FIX_HZ = 10.0
 """A descent by GNSS has to stop within 1 s of a lost fix."""
-MAYBE = frozenset({mavlink.MAVLINK_MSG_ID_GPS2_RAW})
-"""Asked for once: not every vehicle has it."""
+MAYBE = frozenset(
+    {
+        mavlink.MAVLINK_MSG_ID_GPS2_RAW,
+        mavlink.MAVLINK_MSG_ID_FENCE_STATUS,
+        mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
+        mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
+    }
+)
+"""Seldom asked for again: not every vehicle has them, or it sends them in some modes only."""
+TARGET_HZ = 10.0
+FENCE_HZ = TARGET_HZ
+"""As often as targets: a fence changes them."""
 
 Request = tuple[int, tuple[float, float]]
 """MAV_CMD and its first two parameters."""
@@ -39,6 +50,9 @@ class StreamKeeper:
             dialect.height_message: HEIGHT_HZ,
             mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: FIX_HZ,
             mavlink.MAVLINK_MSG_ID_GPS2_RAW: FIX_HZ,
+            mavlink.MAVLINK_MSG_ID_FENCE_STATUS: FENCE_HZ,
+            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: TARGET_HZ,
+            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: HEALTH_HZ,
         }
         if dialect.heartbeat_rate_hz > 0.0:
             self._rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
@@ -59,12 +73,13 @@ class StreamKeeper:
         for message_id, rate_hz in self._rates_hz.items():
             limit_ns = max(SILENT_NS, round(3e9 / rate_hz))
             silent = now_ns - assembler.arrived_ns.get(message_id, 0) > limit_ns
-            if message_id not in self._asked_ns or (silent and message_id not in MAYBE):
+            if message_id not in self._asked_ns or silent:
+                again_ns = MAYBE_AGAIN_NS if message_id in MAYBE else ASK_AGAIN_NS
                 request = (
                     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
                     (float(message_id), 1e6 / rate_hz),
                 )
-                self._ask(requests, message_id, request, ASK_AGAIN_NS, now_ns)
+                self._ask(requests, message_id, request, again_ns, now_ns)
         for once in self._wanted_once:
             if once not in assembler.arrived_ns:
                 request = (mavlink.MAV_CMD_REQUEST_MESSAGE, (float(once), 0.0))

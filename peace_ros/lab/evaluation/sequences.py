@@ -65,6 +65,10 @@ class SequenceStep(NamedTuple):
     new_heatmaps: int
     site_fails: bool
     """A change of state counts as the failure of a descent."""
+    fence: str
+    """What a fence of the autopilot does; the vehicle then reports that it stands."""
+    other_commander: str
+    mode_known: bool
 
 
 CHOICES: dict[str, tuple[tuple[Any, float], ...]] = {
@@ -91,6 +95,9 @@ CHOICES: dict[str, tuple[tuple[Any, float], ...]] = {
     'map_age_s': ((0.2, 30), (1.4, 5), (1.6, 1), (2.1, 1), (60.0, 1), (inf, 1), (nan, 0.5)),
     'new_heatmaps': ((1, 5), (6, 5), (0, 3)),
     'site_fails': ((True, 1), (False, 3)),
+    'fence': (('', 10), ('a fence limits the speed', 3)),
+    'other_commander': (('', 60), ('a second commander', 1)),
+    'mode_known': ((True, 60), (False, 1)),
 }
 """Values of each field with their weights; what is good is frequent, so that sequences go deep."""
 
@@ -173,6 +180,9 @@ class Trial:
             mode='GUIDED' if m.in_control else 'LOITER',
             landed=m.landed,
             battery_remaining=m.battery,
+            fence=m.fence,
+            other_commander=m.other_commander,
+            mode_known=m.mode_known,
         )
 
     def _seen(self, moment: SequenceStep, told: Telemetry) -> Sighting:
@@ -211,6 +221,9 @@ class Trial:
         blind = pose is None or not moment.telemetry_age_s <= self._p.telemetry_age_limit_s
         if blind and not setpoint.is_zero:
             yield 'nothing moves without telemetry that is fresh and valid'
+        doubtful = told.other_commander or not told.mode_known
+        if doubtful and not self._engaged_now and not setpoint.is_zero:
+            yield 'nothing moves while it is not certain that only we command'
         if setpoint.v_down_m_s > 0.0:
             yield from self._broken_by_descent(moment, pose, seen)
         lateral = hypot(v[0], v[1])

@@ -10,9 +10,10 @@ from __future__ import annotations
 import sys
 
 from peace_ros.core.domain import VehicleError
-from peace_ros.simulation.autopilot import AutopilotSim
+from peace_ros.simulation.autopilot import AutopilotSim, Mode
 from peace_ros.simulation.autopilot.faults import FAULTS, clear
 from peace_ros.simulation.autopilot.flight import Flight
+from peace_ros.simulation.autopilot.modes import Result
 from peace_ros.simulation.nodes import autopilot_sim
 
 _STEP_S = 0.01
@@ -28,7 +29,8 @@ def place(
 ) -> None:
     """Let the vehicle stand in the air in GUIDED, armed, undisturbed, without wind.
 
-    The simulated clock runs ahead by the time that boot and take-off take.
+    PX4 stands in AUTO.LOITER: without set-points it does not stay in OFFBOARD. The simulated clock
+    runs ahead by the time that boot and take-off take.
     """
     clear(sim)
     flight = sim.flight
@@ -40,9 +42,9 @@ def place(
         # Twice: the first time it may still have been moving.
         physics = flight.physics
         physics.north_m, physics.east_m, physics.down_m = north_m, east_m, -altitude_m
-        for mode in ('BRAKE', 'GUIDED'):
-            if not sim.pilot_mode(mode):
-                raise VehicleError(f'the simulated autopilot refuses {mode}: start it anew')
+        for mode in (Mode.BRAKE,) if flight.personality.is_px4 else (Mode.BRAKE, Mode.GUIDED):
+            if flight.set_mode(mode) is not Result.ACCEPTED:
+                raise VehicleError(f'the simulated autopilot refuses {mode.name}: start it anew')
         _advance(flight, _SETTLE_S)
 
 
@@ -53,9 +55,13 @@ def _take_off(sim: AutopilotSim, flight: Flight) -> None:
             raise VehicleError(f'no position after {_BOOT_S} s: {flight.prearm_problem()}')
         _advance(flight, 1.0)
         waited_s += 1.0
-    sim.pilot_mode('GUIDED')
-    flight.arm(force=True)
-    flight.take_off(_FLOAT_M)
+    if flight.personality.is_px4:
+        flight.take_off(_FLOAT_M + sim.parameters.home_altitude_msl_m)
+        flight.arm(force=True)
+    else:
+        flight.set_mode(Mode.GUIDED)
+        flight.arm(force=True)
+        flight.take_off(_FLOAT_M)
     waited_s = 0.0
     while flight.landed or flight.physics.down_m > -_OFF_THE_GROUND_M:
         if waited_s > _CLIMB_S:

@@ -267,6 +267,7 @@ class FlightBench:
         if name == 'autopilot_sim':
             parameters = {'port': self.autopilot_port, 'fault_port': self._fault_port}
             parameters['publish_clock'] = self.setting.sim_time
+            parameters['autopilot'] = self.setting.autopilot
             parameters.update(self._key(''))
             clock, remaps = {}, {'/clock': '/' + RAW + 'clock'}
         elif name == 'satellite_view':

@@ -70,7 +70,8 @@ def _expected(given: dict[str, Any]) -> Expected:
         for key in _LISTS
         if key in given
     }
-    return Expected(**{**given, **lists})
+    says = {'says': tuple(given['says'])} if 'says' in given else {}
+    return Expected(**{**given, **lists, **says})
 
 
 FAULTS = load(config_dir() / 'faults.yaml')

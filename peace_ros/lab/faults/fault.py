@@ -57,11 +57,12 @@ class Moment:
     state: str = State.LANDING.value
     below_m: float = inf
     """True altitude, at which or below which."""
+    after_s: float = 0.0
+    """So long after both were seen."""
 
     def __str__(self) -> str:
-        if self.below_m == inf:
-            return f'in {self.state}'
-        return f'in {self.state} below {self.below_m:g} m'
+        below = '' if self.below_m == inf else f' below {self.below_m:g} m'
+        return f'in {self.state}{below}' + (f' for {self.after_s:g} s' if self.after_s else '')
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,8 @@ class Expected:
     """They end within this time, with a status that is not 0."""
     refuses: bool = False
     """The engagement is refused with a sentence."""
+    says: tuple[str, ...] = ()
+    """Each of these words is part of a reason in the status since the injection."""
     over_person_s: float | None = None
     """The vehicle descends within its safety radius of a person for no longer than this."""
     flies: bool = True
@@ -118,6 +121,8 @@ class FlightSetting:
     """All nodes take their time from ``/clock``."""
     signed: bool = False
     """Companion and autopilot share a key of MAVLink 2 signing."""
+    autopilot: str = 'ardupilot'
+    """What the simulated autopilot plays."""
     after_handover: str = 'hold'
     """Parameter of the landing node."""
     at_origin: bool = False

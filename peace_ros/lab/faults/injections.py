@@ -241,12 +241,12 @@ def _loiter() -> Any:
     )
 
 
-def _descend() -> Any:
+def _velocity(north_m_s: float, east_m_s: float, down_m_s: float) -> Any:
     velocity_only = 0x5C7
     return mavlink.MAVLink_set_position_target_local_ned_message(
         *(0, 1, 1, mavlink.MAV_FRAME_LOCAL_NED, velocity_only),
         *(0.0, 0.0, 0.0),
-        *(0.0, 0.0, 2.0),
+        *(north_m_s, east_m_s, down_m_s),
         *(0.0, 0.0, 0.0, 0.0, 0.0),
     )
 
@@ -257,7 +257,11 @@ def _forged_position() -> bytes:
     return bytes(message.pack(codec))
 
 
-_MESSAGES: dict[str, Callable[[], Any]] = {'loiter': _loiter, 'descend': _descend}
+_MESSAGES: dict[str, Callable[[], Any]] = {
+    'loiter': _loiter,
+    'descend': lambda: _velocity(0.0, 0.0, 2.0),
+    'north': lambda: _velocity(2.0, 0.0, 0.0),
+}
 
 
 def injection(given: dict[str, Any]) -> Injection:

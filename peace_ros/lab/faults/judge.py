@@ -137,6 +137,7 @@ def describe(fault: Fault) -> str:
         parts.append(f'{" and ".join(e.ends_processes)} ends within {e.ends_within_s:g} s')
     if e.silent_within_s is not None:
         parts.append(f'no set-point after {e.silent_within_s:g} s')
+    parts.extend(f'the status says "{words}"' for words in e.says)
     if e.over_person_s is not None:
         parts.append(f'descends over the person for {e.over_person_s:g} s at most')
     if e.recovers:
@@ -240,6 +241,13 @@ def _spares(expected: Expected, record: Record) -> Iterator[str]:
         yield 'no person walked below'
     elif over_s > limit_s:
         yield f'descended over the person for {over_s:.1f} s, {limit_s:g} s allowed'
+
+
+def _says(expected: Expected, record: Record) -> Iterator[str]:
+    reasons = [said.reason for said in record.said if said.at_s >= 0.0]
+    for words in expected.says:
+        if not any(words in reason for reason in reasons):
+            yield f'the status never said "{words}"'
 
 
 def _recovers(expected: Expected, record: Record) -> Iterator[str]:
@@ -358,7 +366,8 @@ def _nothing_after_abort(_expected: Expected, record: Record) -> Iterator[str]:
 
 
 _RULES = (
-    *(_reaches, _allowed, _stands, _zero, _silent, _spares, _recovers, _stays, _refuses, _ends),
+    *(_reaches, _allowed, _stands, _zero, _silent, _says, _spares, _recovers, _stays, _refuses),
+    _ends,
 )
 """What a fault may ask for."""
 _ALWAYS = (_handovers, _crashes, _hangs, _floor, _zero_means_zero, _nothing_after_abort)

@@ -82,6 +82,7 @@ class Scenario:
                 self._await_moment(Moment(below_m=LEAD_BELOW_M))
                 self.fault.lead.begin(self.bench)
             self._await_moment(self.fault.at)
+            self.bench.watch(self.fault.at.after_s)
             self._inject()
             self._watch_fault()
         if self.fault.lead is not None:

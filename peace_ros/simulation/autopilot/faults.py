@@ -23,8 +23,10 @@ from math import isinf, radians
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from peace_ros.core.domain.errors import VehicleError
+from peace_ros.simulation.autopilot.commander import SecondCommander
 from peace_ros.simulation.autopilot.disturbance import Disturbance
 from peace_ros.simulation.autopilot.fault_client import FaultClient
+from peace_ros.simulation.autopilot.fence import Fence, FenceKind
 
 if TYPE_CHECKING:
     from peace_ros.simulation.autopilot.autopilot import AutopilotSim
@@ -76,6 +78,8 @@ def clear(sim: AutopilotSim) -> None:
     sim.disturbance.__dict__.update(vars(Disturbance()))
     sim.restore_gps()
     sim.pilot_yaw_stick(0.0)
+    sim.flight.fence = Fence()
+    sim.flight.commander = SecondCommander()
 
 
 @_fault
@@ -247,11 +251,59 @@ def wind(
 
 
 @_fault
-def battery(sim: AutopilotSim, *, remaining: float) -> None:
-    """Set the charge, 0 to 1; below 0.2 a STATUSTEXT warns once."""
+def fence(
+    sim: AutopilotSim,
+    *,
+    kind: str,
+    at_m: float = 0.0,
+    north_m: float = 0.0,
+    east_m: float = 0.0,
+    around_vehicle: bool = False,
+) -> None:
+    """Enable a fence: ArduPilot stops the vehicle 2 m before it, silently; PX4 holds beyond it.
+
+    Args:
+        sim: The simulation.
+        kind: ``none`` ends it; ``floor`` (least altitude), ``ceiling``, ``circle``.
+        at_m: Altitude above home, or radius.
+        north_m: Of the centre of the circle.
+        east_m: Of the centre of the circle.
+        around_vehicle: The centre is where the vehicle is now; the other two are added.
+    """
+    _one_of('kind', kind, tuple(each.value for each in FenceKind))
+    here = sim.flight.position_m if around_vehicle else (0.0, 0.0)
+    centre_m = (here[0] + float(north_m), here[1] + float(east_m))
+    sim.flight.fence = Fence(FenceKind(kind), float(at_m), centre_m)
+
+
+@_fault
+def commander(
+    sim: AutopilotSim,
+    *,
+    rate_hz: float = 50.0,
+    v_north_m_s: float = 0.0,
+    v_east_m_s: float = 0.0,
+    v_down_m_s: float = 0.0,
+) -> None:
+    """Let somebody else send velocity set-points too; a rate of 0 ends it."""
+    velocity = (float(v_north_m_s), float(v_east_m_s), float(v_down_m_s))
+    sim.flight.commander = SecondCommander(velocity, float(rate_hz))
+
+
+@_fault
+def battery(sim: AutopilotSim, *, remaining: float, failsafe: str = '') -> None:
+    """Set the charge, 0 to 1; below 0.2 a STATUSTEXT warns once, and BATTERY_STATUS says LOW.
+
+    Args:
+        sim: The simulation.
+        remaining: Charge.
+        failsafe: Mode that the autopilot is configured to enter below 0.2, such as ``RTL``; empty:
+            none, which is the default of ArduCopter and PX4.
+    """
     if not 0.0 <= remaining <= 1.0:
         raise VehicleError(f'fault battery: remaining = {remaining} must lie between 0 and 1')
-    sim.flight.set_battery(float(remaining))
+    mode = sim.flight.personality.mode_of_name(failsafe) if failsafe else None
+    sim.flight.set_battery(float(remaining), mode)
 
 
 @_fault

@@ -12,8 +12,10 @@ from collections import deque
 from dataclasses import replace
 from math import isfinite
 
+from peace_ros.simulation.autopilot.commander import SecondCommander
 from peace_ros.simulation.autopilot.estimate_errors import EstimateErrors
 from peace_ros.simulation.autopilot.estimator import RECKONS_PX4_S, RECKONS_S, Estimator
+from peace_ros.simulation.autopilot.fence import Fence
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import RULES, LandedState, Mode, Result, Severity
 from peace_ros.simulation.autopilot.personality import (
@@ -31,7 +33,7 @@ SPOOL_UP_S = 2.5
 PREARM_TEXT_EVERY_S = 30.0
 FORCE_MAGIC = 21196
 """param2 of the arm command that skips the checks."""
-LOW_BATTERY = 0.2
+LOW_BATTERY, CRITICAL_BATTERY = 0.2, 0.1
 
 
 class Flight:
@@ -49,6 +51,8 @@ class Flight:
         self._ground_msl_m = ground_msl_m
         self.estimator = Estimator(RECKONS_PX4_S if self.personality.is_px4 else RECKONS_S)
         self.errors = errors or EstimateErrors()
+        self.fence = Fence()
+        self.commander = SecondCommander()
         self.time_s = 0.0
         self.mode = Mode.STABILIZE
         self.armed = False
@@ -141,11 +145,17 @@ class Flight:
             self._enter(Mode.LAND)
         if self._steering.wants_land(self.mode):
             self._enter(Mode.LAND)
+        rival = self.commander.due(self.time_s)
+        if rival is not None:
+            self.take_velocity(rival)
         self._watch_offboard()
+        self._watch_fence()
         self._take_off_by_mode()
         command = self._steering.command(
             dt_s, self.mode, armed=self.armed, landed=self.landed, has_position=self.has_position
         )
+        if self.mode is Mode.GUIDED and not self.personality.is_px4:
+            command = self.fence.kept(command, self.position_m, self.time_s)
         self.physics.step(dt_s, self._as_estimated(command))
         self._feel_ground(dt_s)
 
@@ -283,11 +293,31 @@ class Flight:
         """Tell a STATUSTEXT."""
         self.texts.append((int(severity), text))
 
-    def set_battery(self, remaining: float) -> None:
-        """Set the charge, 0 to 1."""
+    def set_battery(self, remaining: float, failsafe: Mode | None = None) -> None:
+        """Set the charge, 0 to 1; when it is low, the mode of the failsafe is entered."""
         if remaining < LOW_BATTERY <= self.battery_remaining:
             self.say(Severity.CRITICAL, f'Battery 1 is low: {remaining:.0%} remaining')
         self.battery_remaining = remaining
+        if failsafe is not None and remaining < LOW_BATTERY and self.armed and not self.landed:
+            self._enter(failsafe)
+
+    @property
+    def target_m_s(self) -> tuple[float, float, float] | None:
+        """North, east, down: the velocity that GUIDED follows, None in other modes."""
+        if self.mode is not Mode.GUIDED or self._steering.taking_off:
+            return None
+        command = self._steering.target()
+        if not self.personality.is_px4:
+            command = self.fence.kept(command, self.position_m, self.time_s)
+        return command.v_north_m_s, command.v_east_m_s, command.v_down_m_s
+
+    def _watch_fence(self) -> None:
+        """PX4 holds when the vehicle crosses a fence (its default action; not measured)."""
+        if not self.personality.is_px4 or self.mode is not Mode.GUIDED:
+            return
+        if self.fence.room_m(self.position_m) < 0.0:
+            self.say(Severity.CRITICAL, 'Geofence exceeded: hold')
+            self._enter(Mode.BRAKE)
 
     def _stream_flows(self) -> bool:
         age_s = self.setpoint_age_s

@@ -142,6 +142,11 @@ class Steering:
             return _drift(speed)
         return replace(self._hold_point(), v_down_m_s=speed)
 
+    def target(self) -> VelocityCommand:
+        """Return the velocity that GUIDED follows, zero once the set-point is too old."""
+        v = self._velocity if self._velocity_age_s < GUID_TIMEOUT_S else STOP
+        return VelocityCommand(v.v_north_m_s, v.v_east_m_s, v.v_down_m_s)
+
     def _guided(self) -> VelocityCommand:
         v: GuidedVelocity = self._velocity
         if self._velocity_age_s >= GUID_TIMEOUT_S:

@@ -12,13 +12,15 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.simulation.autopilot.disturbance import Disturbance, Vector
 from peace_ros.simulation.autopilot.estimator import READY_S
-from peace_ros.simulation.autopilot.flight import Flight
+from peace_ros.simulation.autopilot.flight import CRITICAL_BATTERY, LOW_BATTERY, Flight
 from peace_ros.simulation.autopilot.modes import LandedState
 from peace_ros.simulation.autopilot.parameters import AutopilotParameters
 from peace_ros.simulation.autopilot.personality import EKF_STATUS, Personality
 
 METRES_PER_DEGREE = 111_319.49
 UNKNOWN_U16 = 65535
+VELOCITY_ONLY = 0xDC7
+"""Type mask of POSITION_TARGET_LOCAL_NED: only the velocity counts."""
 SENSORS = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
     | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
@@ -54,10 +56,16 @@ class Streams:
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: self.home_position,
             mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self._gps_global_origin,
             mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
+            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
+            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: self._position_target,
             estimator: ekf_status if estimator == EKF_STATUS else estimator_status,
         }
         if self._personality.is_px4:
             self._builders[mavlink.MAVLINK_MSG_ID_ALTITUDE] = self._altitude
+        else:
+            self._builders[mavlink.MAVLINK_MSG_ID_FENCE_STATUS] = lambda flight: (
+                flight.fence.status(flight.position_m, flight.time_s)
+            )
 
     def knows(self, message_id: int) -> bool:
         """Whether this message can be asked for."""
@@ -170,6 +178,16 @@ class Streams:
             round(degrees(flight.physics.yaw_rad) % 360.0 * 100) % 36000,
         )
 
+    def _position_target(self, flight: Flight) -> Any:
+        """Return POSITION_TARGET_LOCAL_NED: what GUIDED follows, whoever sent it."""
+        target_m_s = flight.target_m_s
+        if target_m_s is None:
+            return None
+        frame, place = mavlink.MAV_FRAME_LOCAL_NED, (0.0,) * 3
+        return mavlink.MAVLink_position_target_local_ned_message(
+            self._boot_ms(flight), frame, VELOCITY_ONLY, *place, *target_m_s, *(0.0,) * 5
+        )
+
     def _gps_raw_int(self, flight: Flight) -> Any:
         physics = flight.physics
         fix = flight.estimator.gps and flight.time_s >= READY_S / 4
@@ -246,6 +264,20 @@ def sys_status(flight: Flight) -> Any:
         0,
         0,
         0,
+    )
+
+
+def battery_status(flight: Flight) -> Any:
+    """Return BATTERY_STATUS of one battery, with its state of charge."""
+    remaining, charge = flight.battery_remaining, mavlink.MAV_BATTERY_CHARGE_STATE_OK
+    if remaining < LOW_BATTERY:
+        charge = mavlink.MAV_BATTERY_CHARGE_STATE_LOW
+    if remaining < CRITICAL_BATTERY:
+        charge = mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL
+    who = (0, mavlink.MAV_BATTERY_FUNCTION_ALL, mavlink.MAV_BATTERY_TYPE_LIPO)
+    voltages_mv = [12400, *[UNKNOWN_U16] * 9]
+    return mavlink.MAVLink_battery_status_message(
+        *who, 32767, voltages_mv, 200, -1, -1, round(remaining * 100.0), 0, charge
     )
 
 

@@ -424,3 +424,86 @@ def test_an_age_that_grows_is_no_new_reason():
     assert len(told) == 2
     assert any('3.6 s old' in reason for reason in told)
     assert any('jumped' in reason for reason in told)
+
+
+class FencedTrip(Trip):
+    """A vehicle that a fence keeps from where ``inside`` does not hold."""
+
+    def inside(self) -> bool:
+        return True
+
+    def fly(self, setpoint: Setpoint) -> None:
+        before = (self.north_m, self.east_m, self.altitude_m, self.lowest_m)
+        super().fly(setpoint)
+        self.stopped = not setpoint.is_zero and not self.inside()
+        if self.stopped:
+            self.north_m, self.east_m, self.altitude_m, self.lowest_m = before
+        self.told = {
+            'fence': 'a fence limits the speed' if self.stopped else '',
+            'v_north_m_s': 0.0 if self.stopped else setpoint.v_north_m_s,
+            'v_east_m_s': 0.0 if self.stopped else setpoint.v_east_m_s,
+            'v_down_m_s': 0.0 if self.stopped else setpoint.v_down_m_s,
+        }
+
+    def step(self, **changes) -> Decision:
+        return super().step(**{**getattr(self, 'told', {}), **changes})
+
+
+class FloorTrip(FencedTrip):
+    def inside(self) -> bool:
+        return self.altitude_m > 36.0
+
+
+class CircleTrip(FencedTrip):
+    def inside(self) -> bool:
+        return self.home_m < 30.0
+
+
+def test_a_fence_below_ends_the_descent_and_another_attempt_is_made():
+    trip = FloorTrip(lawn=replace(LAWN, north_m=1.0, east_m=0.0))
+    trip.run(60.0)
+    climb = next(each for each in trip.log if each.state is State.CLIMBING)
+    assert 'a fence limits the speed' in climb.reason
+    assert climb.setpoint.v_down_m_s < 0.0
+    assert trip.states[:5] == [
+        *(State.SEARCHING, State.AIMING, State.LANDING, State.CLIMBING, State.RESTARTING)
+    ]
+    assert State.HOLD not in trip.states
+    assert trip.lowest_m > 36.0
+
+
+def test_the_reason_of_the_last_failed_descent_stands_in_the_end_of_the_attempts():
+    parameters = LandingParameters(max_attempts=1)
+    trip = FloorTrip(parameters, lawn=replace(LAWN, north_m=1.0, east_m=0.0))
+    while State.CLIMBING not in trip.states:
+        trip.step()
+    trip.helm.fail_attempt()
+    reason = trip.step().reason
+    assert '1 descents failed, limit 1 (the last: a fence limits the speed' in reason
+    assert trip.helm.state is State.HOLD
+
+
+def test_a_search_that_meets_a_fence_turns_to_the_next_way_point():
+    trip = CircleTrip()
+    trip.run(120.0)
+    assert trip.states == [State.SEARCHING]
+    turned = [each for each in trip.log if each.setpoint.v_east_m_s > 1.0]
+    assert turned, 'the first leg leads north, into the fence'
+
+
+def test_another_commander_holds_and_says_who():
+    trip = Trip(lawn=replace(LAWN, north_m=1.0, east_m=0.0))
+    while trip.helm.state is not State.LANDING:
+        trip.step()
+    decision = trip.step(other_commander='a second commander: 2 m/s')
+    assert (decision.state, decision.reason) == (State.HOLD, 'a second commander: 2 m/s')
+    assert decision.setpoint.is_zero
+    assert trip.step().state is State.SEARCHING
+
+
+def test_a_mode_that_is_not_known_holds():
+    trip = Trip(lawn=LAWN)
+    trip.step()
+    decision = trip.step(mode_known=False)
+    assert decision.state is State.HOLD
+    assert 'until the autopilot reports its mode' in decision.reason

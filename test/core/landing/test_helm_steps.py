@@ -349,7 +349,9 @@ def test_failed_descents_are_counted_and_time_without_a_site_is_told() -> None:
     steps.helm.fail_attempt()
     steps.helm.fail_attempt()
     assert steps.helm.attempts == 2
-    assert steps.step().reason == '2 descents failed, limit 2: holding'
+    assert steps.step().reason == (
+        '2 descents failed, limit 2 (the last: the trial begins in SEARCHING): holding'
+    )
     steps.helm.engage()
     assert steps.helm.attempts == 0
     assert steps.helm.without_site_s == 0.0

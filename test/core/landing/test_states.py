@@ -144,6 +144,44 @@ def test_the_last_attempt_goes_by_the_rules_of_every_attempt():
     assert next_state(State.LANDING, centred, 0.0, BEST_SITE)[0] is State.HANDOVER
 
 
+FENCED = replace(FLYING, site_known=True, blocked='a fence is in the way')
+
+
+@pytest.mark.parametrize(
+    ('state', 'high', 'target'),
+    [
+        (State.AIMING, True, State.RESTARTING),
+        (State.AIMING, False, State.CLIMBING),
+        (State.LANDING, True, State.CLIMBING),
+        (State.LANDING, False, State.CLIMBING),
+        (State.CLIMBING, False, State.RESTARTING),
+    ],
+)
+def test_a_fence_in_the_way_makes_another_site_be_tried_and_is_named(state, high, target):
+    events = replace(FENCED, at_safe_altitude=high)
+    found, reason = next_state(state, events, 0.0, P)
+    assert found is target
+    assert reason.startswith('a fence is in the way: ')
+    assert 'another site' in reason
+    assert next_state(state, replace(events, blocked=''), 0.0, P)[0] is state
+
+
+def test_a_fence_outranks_neither_a_hand_over_nor_the_guards():
+    done = replace(FENCED, over_site=True, centred=True, at_handover_altitude=True)
+    assert next_state(State.LANDING, done, 0.0, P)[0] is State.HANDOVER
+    assert next_state(State.LANDING, replace(FENCED, bad_data='old'), 0.0, P)[0] is State.HOLD
+    for state in State:
+        for events in every_event(engaged=True, blocked='fence'):
+            target, reason = next_state(state, events, 0.0, P)
+            assert target is state or target in TRANSITIONS[state]
+            assert reason or target is state
+
+
+def test_an_aborted_landing_goes_on_saying_why():
+    told = replace(FLYING, taken_over='mode LOITER')
+    assert 'mode LOITER' in next_state(State.ABORTED, told, 9.0, P)[1]
+
+
 def test_waiting_ends_upwards_below_the_safe_altitude_and_elsewhere_above_it():
     assert next_state(State.WAITING, FLYING, P.giveup_after_s, P)[0] is State.CLIMBING
     high = replace(FLYING, at_safe_altitude=True)

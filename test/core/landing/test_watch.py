@@ -115,6 +115,26 @@ def test_control_is_lost_by_whoever_had_it_and_for_good(told, word):
     assert watch.taken_over == before
 
 
+def lost(seconds, explanation, first='') -> str:
+    """Who has control after it was lost, explained first at once and then so much later."""
+    watch = ControlWatch()
+    watch.see(GOOD)
+    gone = replace(GOOD, in_control=False, mode='RTL', received_ns=10 * S)
+    watch.see(replace(gone, explanation=first))
+    watch.see(replace(gone, explanation=explanation, received_ns=round((10 + seconds) * S)))
+    return watch.taken_over
+
+
+def test_what_the_autopilot_reports_of_a_takeover_stands_beside_it():
+    assert lost(0.1, '', 'the battery is low').endswith(
+        '(the autopilot reports: the battery is low)'
+    )
+    assert lost(1.9, 'the battery is low').endswith('(the autopilot reports: the battery is low)')
+    assert 'battery' not in lost(2.1, 'the battery is low'), 'too late to explain it'
+    assert 'fence' not in lost(0.1, 'a fence', 'the battery is low'), 'the first one stays'
+    assert 'reports' not in lost(0.1, '')
+
+
 def spent(parameters, *steps, attempts=0) -> Budget:
     """A budget after steps of (time in s, north in m, looking, site known)."""
     budget = Budget(parameters)

@@ -7,8 +7,9 @@ import time
 import pytest
 
 from peace_ros.core.domain import Setpoint
-from peace_ros.core.vehicle import Answer, SetpointSender, open_vehicle
+from peace_ros.core.vehicle import Answer, SenderState, SetpointSender, open_vehicle
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
+from peace_ros.simulation.autopilot.faults import inject
 from peace_ros.simulation.demo.pilot import Pilot
 
 
@@ -81,3 +82,47 @@ def test_lands_and_holds_in_its_own_modes(px4, eventually):
     assert sim.mode_name == 'AUTO.LOITER'
     level = link.request_level_hold()
     assert 'cannot hold its height without a position' in level.reason
+
+
+def test_after_a_silent_line_nothing_is_sent_and_the_failsafe_of_the_autopilot_stays(
+    px4, eventually
+):
+    sim, link = px4
+    sender = SetpointSender(link)
+    assert link.request_control(by_person=True)
+    sender.start()
+    sender.submit(Setpoint(0))
+    assert eventually(lambda: sim.mode_name == 'OFFBOARD')
+    inject(sim, 'silence', seconds=3.0)
+    begin = time.monotonic()
+    assert eventually(lambda: not link.telemetry().mode_known, 2.0)
+    silent_s = time.monotonic() - begin
+    assert 0.7 < silent_s < 1.2
+    assert link.telemetry().in_control, 'the last mode that was reported'
+    modes = set()
+    while time.monotonic() < begin + 5.0:
+        sender.submit(Setpoint(0))
+        modes.add(sim.mode_name)
+        time.sleep(0.02)
+    assert modes == {'OFFBOARD', 'AUTO.RTL'}
+    assert sim.mode_name == 'AUTO.RTL', 'set-points would have brought OFFBOARD back'
+    assert link.taken_over
+    assert link.telemetry().mode_known
+    assert sender.statistics().state is SenderState.NOT_IN_CONTROL
+    sender.stop()
+
+
+def test_a_mode_that_is_not_known_stops_the_dead_man_and_the_last_zeros(px4, eventually):
+    sim, link = px4
+    assert link.request_control(by_person=True)
+    assert eventually(lambda: sim.mode_name == 'OFFBOARD')
+    sender = SetpointSender(link)
+    sender.start()
+    sender.submit(Setpoint(0))
+    inject(sim, 'silence')
+    assert eventually(lambda: sender.statistics().state is SenderState.MODE_UNKNOWN, 2.0)
+    sent = sender.statistics().zeros
+    assert not link.stop_at_once()
+    time.sleep(0.3)
+    assert sender.statistics().zeros == sent
+    sender.stop()

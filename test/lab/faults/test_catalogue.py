@@ -95,6 +95,7 @@ def test_no_fault_asks_for_nothing() -> None:
         e = fault.expected
         asked = (
             *e.reaches,
+            *e.says,
             e.still_within_s,
             e.zero_within_s,
             e.silent_within_s,

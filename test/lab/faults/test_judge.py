@@ -207,3 +207,19 @@ def test_a_person_below_is_not_descended_upon_for_long(stopping: Fault, record: 
     assert row.figures['over_person_s'] == 1.2
     record.over_person_s = 1.8
     assert any('over the person for 1.8 s' in each for each in judge(fault, record).failures)
+
+
+def test_a_reason_that_was_never_said_fails(stopping: Fault, record: Record) -> None:
+    fault = with_expected(stopping, says=('a fence', 'in the way'))
+    record.said = [replace(s, reason='a fence is here') for s in record.said]
+    failures = judge(fault, record).failures
+    assert failures == ('the status never said "in the way"',)
+    record.said[-1] = replace(record.said[-1], reason='it is in the way')
+    assert judge(fault, record).passed
+    assert 'the status says "a fence"' in describe(fault)
+
+
+def test_a_reason_of_before_the_fault_does_not_count(stopping: Fault, record: Record) -> None:
+    fault = with_expected(stopping, says=('a fence',))
+    record.said = [Said(-1.0, 'LANDING', 'a fence'), *record.said]
+    assert judge(fault, record).failures == ('the status never said "a fence"',)

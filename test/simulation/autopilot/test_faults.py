@@ -288,3 +288,89 @@ def test_px4_refuses_a_frame_and_offboard_without_a_stream():
     assert [m.result for m in heard if m.get_type() == 'COMMAND_ACK'] == [0]
     ear.socket.close()
     sim.close()
+
+
+def asked(ear, *numbers):
+    """Ask for messages at 10 Hz."""
+    for number in numbers:
+        ear.command(511, number, 100_000)
+    ear.hear(0.5)
+
+
+def test_a_fence_stops_guided_silently_and_reports_when_it_is_asked(sim, ear):
+    asked(ear, 162)
+    assert ear.of('FENCE_STATUS') == [], 'without a fence there is no status'
+    inject(sim, 'fence', kind='floor', at_m=6.0)
+    for _ in range(40):
+        steer(ear, 0.0, 0.0, 1.0)
+        heard = ear.hear(0.3)
+    assert sim.truth().altitude_agl_m == pytest.approx(8.0, abs=0.3)
+    statuses = [m for m in heard if m.get_type() == 'FENCE_STATUS']
+    assert statuses[-1].breach_mitigation == mavlink.FENCE_MITIGATE_VEL_LIMIT
+    assert statuses[-1].breach_status == 0
+    assert not [m for m in heard if m.get_type() == 'STATUSTEXT']
+    inject(sim, 'clear')
+    for _ in range(10):
+        steer(ear, 0.0, 0.0, 1.0)
+        ear.hear(0.3)
+    assert sim.truth().altitude_agl_m < 7.0
+
+
+def test_the_circle_lies_around_the_vehicle_where_that_is_asked_for(sim):
+    inject(sim, 'fence', kind='circle', at_m=9.0, around_vehicle=True, north_m=2.0)
+    assert sim.flight.fence.centre_m == pytest.approx((32.0, 10.0), abs=0.5)
+
+
+def steer(ear, north, east, down):
+    ear.send(
+        mavlink.MAVLink_set_position_target_local_ned_message(
+            *(0, 1, 1, 1, 0x5C7), *(0.0, 0.0, 0.0), *(north, east, down), *(0.0,) * 5
+        )
+    )
+
+
+def test_the_target_that_is_followed_is_reported_in_guided_only(sim, ear):
+    asked(ear, 85)
+    steer(ear, 1.0, -0.5, 0.25)
+    target = ear.of('POSITION_TARGET_LOCAL_NED')[-1]
+    assert (target.vx, target.vy, target.vz) == (1.0, -0.5, 0.25)
+    assert target.type_mask & 0x038 == 0, 'the velocity counts'
+    target = ear.of('POSITION_TARGET_LOCAL_NED', 4.0)[-1]
+    assert (target.vx, target.vy, target.vz) == (0.0, 0.0, 0.0), 'after GUID_TIMEOUT'
+    inject(sim, 'pilot_mode', mode='LOITER')
+    ear.hear(0.5)
+    assert ear.of('POSITION_TARGET_LOCAL_NED') == []
+
+
+def test_a_second_commander_is_obeyed_and_reported_until_it_ends(sim, ear):
+    asked(ear, 85)
+    inject(sim, 'commander', v_north_m_s=2.0)
+    ear.hear(3.0)
+    target = ear.of('POSITION_TARGET_LOCAL_NED')[-1]
+    assert (target.vx, target.vy, target.vz) == (2.0, 0.0, 0.0)
+    assert inject(sim, 'state')['v_north_m_s'] > 1.5
+    inject(sim, 'clear')
+    ear.hear(6.0)
+    assert inject(sim, 'state')['v_north_m_s'] == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize(('remaining', 'charge'), [(0.5, 1), (0.19, 2), (0.09, 3)])
+def test_a_low_battery_has_its_state_of_charge(sim, ear, remaining, charge):
+    asked(ear, 147)
+    inject(sim, 'battery', remaining=remaining)
+    status = ear.of('BATTERY_STATUS')[-1]
+    assert (status.charge_state, status.battery_remaining) == (charge, round(remaining * 100))
+    assert sim.mode_name == 'GUIDED'
+
+
+def test_a_low_battery_enters_the_mode_of_its_failsafe(sim):
+    inject(sim, 'battery', remaining=0.3, failsafe='RTL')
+    assert sim.mode_name == 'GUIDED'
+    inject(sim, 'battery', remaining=0.1, failsafe='RTL')
+    assert sim.mode_name == 'RTL'
+
+
+@pytest.mark.parametrize('arguments', [{'kind': 'wall'}, {}])
+def test_an_unknown_fence_is_refused(sim, arguments):
+    with pytest.raises(VehicleError, match='kind'):
+        inject(sim, 'fence', **arguments)
