@@ -175,6 +175,12 @@ def test_a_patch_shows_the_ground_north_up(pose: Pose, axis: int) -> None:
     assert found == pytest.approx(list(expected), abs=0.6)
 
 
+def test_where_the_vehicle_is_does_not_count() -> None:
+    view = view_of(texture(256, 256), pitch=8.0)
+    away = replace(view, pose=replace(view.pose, north_m=500.0, east_m=-300.0))
+    np.testing.assert_allclose(steps._middle(away, CAMERA), steps._middle(view, CAMERA))
+
+
 def test_a_patch_is_smoothed_a_little() -> None:
     grey = np.zeros((256, 256), np.uint8)
     grey[127:129, 127:129] = 200  # ground of 2 x 2 pixels, 1.7 x 1.7 cells

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from math import cos, radians, tan
+from dataclasses import replace
+from math import cos, degrees, pi, radians, tan
 
 import cv2
 import numpy as np
@@ -18,6 +19,7 @@ from peace_ros.core.mapping.projection import (
     Window,
     heatmap_from_ground,
     project,
+    tilt_rad,
     visible_window,
     worst_part,
 )
@@ -404,3 +406,34 @@ def test_the_reason_of_a_refusal_is_told_in_a_few_words(pose: Pose, fate: str) -
     sentence = 'off the vertical' if 'tilt' in fate else 'or more above ground to project'
     assert sentence in str(refused.value)
     assert safety_map.stamp_ns is None
+
+
+@pytest.mark.parametrize(
+    ('angles', 'tilt_deg'),
+    [
+        ({}, 0.0),
+        ({'yaw': 130.0}, 0.0),
+        ({'roll': 20.0}, 20.0),
+        ({'pitch': -30.0, 'yaw': 50.0}, 30.0),
+        ({'roll': 120.0}, 120.0),
+    ],
+)
+def test_tilt_is_the_angle_off_the_vertical(angles: dict[str, float], tilt_deg: float) -> None:
+    assert degrees(tilt_rad(pose_of(30.0, 0.0, 0.0, **angles))) == pytest.approx(tilt_deg)
+
+
+def test_an_inaccurate_quaternion_upside_down_has_a_tilt() -> None:
+    pose = replace(pose_of(30.0, 0.0, 0.0), quaternion_ned_frd=(0.0, 1.005, 0.0, 0.0))
+    assert tilt_rad(pose) == pi
+
+
+def test_cells_that_are_not_in_front_of_the_camera_do_not_count() -> None:
+    """Every cell falls on the pixel (20, 10), but at a depth of north - 2 east + 0.5."""
+    grid = GroundGrid(-8.0, -5.0, 1.0, 16, 10)
+    matrix = np.outer([20.0, 10.0, 1.0], [1.0, -2.0, 0.5])
+    safety = np.full((30, 40), 90, np.uint8)
+    _, kind = project(safety, np.ones_like(safety), matrix, grid)
+    north, east = np.mgrid[-7.5:8.0:1.0, -4.5:5.0:1.0]
+    depth = north - 2.0 * east + 0.5
+    assert (depth == 0.0).any()
+    np.testing.assert_array_equal(kind, depth > 0.0)
