@@ -34,7 +34,7 @@ cd "$checkout"
 echo '== style'
 ruff check .
 ruff format --check .
-shellcheck -x launch_scripts/*.sh .ci/run
+shellcheck -x launch_scripts/*.sh launch_scripts/docker/*.sh .ci/run .ci/ubuntu-24.04
 echo '== types'
 mypy
 echo '== import rules'

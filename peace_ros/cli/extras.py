@@ -11,6 +11,8 @@ from importlib.util import find_spec
 
 EXTRA_OF = {
     'rosbags': 'simulation',
+    'mcap': 'simulation',
+    'zstandard': 'simulation',
     'rasterio': 'geo',
     'jinja2': 'lab',
     'matplotlib': 'simulation',

@@ -17,6 +17,7 @@ import typer
 
 from peace_ros import __version__
 from peace_ros.cli.extras import how_to_install
+from peace_ros.cli.options import for_typer
 from peace_ros.core.domain import (
     BundleError,
     ConfigurationError,
@@ -28,6 +29,7 @@ from peace_ros.core.domain import (
 EXIT_FAILED, EXIT_REFUSED, EXIT_INTERRUPTED = 1, 2, 130
 
 VERBS = {
+    'doctor': 'Check ROS, models, camera, autopilot and computer before a flight.',
     'demo': 'Fly a simulated vehicle from 100 m to 20 m over a place that the nodes choose.',
     'replay': 'Run prompts, segmentation and landing over a recording.',
     'benchmark': 'Time CLIPSeg and FastSAM per frame, beside the ways that others run them.',
@@ -40,6 +42,7 @@ VERBS = {
 MODEL_VERBS = {
     'list': 'List the bundles that ship with the package, and your own.',
     'info': "Show a bundle's manifest.",
+    'warm': 'Run a frame through the networks, so that what a provider builds is there.',
     'verify': 'Check the files of a bundle against the checksums of its manifest.',
     'export': 'Export CLIP, CLIPSeg or FastSAM, verify it against its reference, put it in place.',
     'fetch': 'Fetch a named bundle, checked and resumable.',
@@ -69,7 +72,7 @@ def _add(to: typer.Typer, name: str, summary: str, module: str, function: str) -
         with _in_one_sentence():
             verb = getattr(importlib.import_module(f'peace_ros.cli.{module}'), function)
             own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-            own.command()(verb)
+            own.command()(for_typer(verb))
             status = own(args=context.args, prog_name=context.command_path, standalone_mode=False)
             if isinstance(status, int) and status:
                 raise typer.Exit(status)
@@ -114,6 +117,7 @@ def _show_version(wanted: bool) -> None:
 
 
 @app.callback()
+@for_typer
 def root(
     _version: Annotated[
         bool,

@@ -14,6 +14,7 @@ from peace_ros.cli.extras import require
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.inference.bundle import user_models_dir
 from peace_ros.core.inference.manifest import PRECISIONS
+from peace_ros.core.presets import DEFAULT_PRESET
 
 _INDEX = 'PEACE_MODELS_INDEX'
 _NEEDED = ('torch', 'transformers', 'onnx')
@@ -58,6 +59,50 @@ def models_verify(name: Annotated[str, typer.Argument(help='Name or folder.')]) 
         typer.echo('agreement with the reference when it was exported:')
     for figure, value in bundle.manifest.verification.items():
         typer.echo(f'  {figure:<12} {value:g}')
+
+
+def models_warm(
+    *,
+    config: Annotated[
+        str, typer.Option(metavar='PRESET', help='Preset or parameter file of the nodes.')
+    ] = DEFAULT_PRESET,
+    provider: Annotated[
+        list[str] | None,
+        typer.Option(help='Execution providers in place of those of the preset, in order.'),
+    ] = None,
+    size: Annotated[
+        str, typer.Option(metavar='WxH', help="Pixels of a frame; none: the preset's camera.")
+    ] = '',
+) -> None:
+    """Load the networks of a preset and run frames through them.
+
+    What a provider builds and keeps, such as the engines of TensorRT, is then there when the nodes
+    start. Exit status 1 when something must be mended.
+    """
+    from peace_ros.core.node_parameters import CameraOptions
+    from peace_ros.core.presets import load_preset
+    from peace_ros.lab.doctor.finding import CheckResult
+    from peace_ros.lab.doctor.models import Models
+
+    preset = load_preset(config)
+    camera = preset.fill('landing', CameraOptions)
+    width_px, height_px = _size(size) if size else (camera.camera_width, camera.camera_height)
+    models = Models(preset, provider or (), builds_engines=True)
+    failed = False
+    for check in (models.load, lambda: models.time_frame(width_px, height_px)):
+        for each in check():
+            typer.echo(f'{each.found}: {each.remedy}' if each.remedy else each.found)
+            failed |= each.outcome is CheckResult.MEND
+    if failed:
+        raise typer.Exit(1)
+
+
+def _size(text: str) -> tuple[int, int]:
+    """Return width and height of ``640x480``; ConfigurationError for anything else."""
+    parts = text.split('x')
+    if len(parts) != 2 or not all(each.isdecimal() and 16 <= int(each) <= 8192 for each in parts):
+        raise ConfigurationError(f'--size {text!r}: give width x height, 16 to 8192: 640x480')
+    return int(parts[0]), int(parts[1])
 
 
 def models_export(

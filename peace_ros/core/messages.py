@@ -9,15 +9,28 @@ whatever classes it is given. Stamps are carried over, never renewed.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from math import isfinite, sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import DepthImage, Frame, Heatmap, ImageError, Pose, Prompt, VehicleError
+from peace_ros.core.domain import (
+    Camera,
+    DepthImage,
+    Distortion,
+    Frame,
+    Heatmap,
+    ImageError,
+    Pose,
+    Prompt,
+    VehicleError,
+)
+from peace_ros.core.domain.camera import UPRIGHT
 from peace_ros.core.domain.geometry import attitude_enu_flu_to_ned_frd, enu_to_ned
 from peace_ros.core.images import jpeg_from_rgb, pixels_from_raw, rgb_from_message
+from peace_ros.core.optics import check_lens
 from peace_ros.core.prompting.pairs import prompt_from_pairs
 
 NANOSECONDS = 1_000_000_000
@@ -37,19 +50,97 @@ def stamp_ns_of(message: Any) -> int:
     return ns_from_time(message.header.stamp)
 
 
-def frame_from_message(message: Any) -> Frame:
-    """Return the frame of an Image or CompressedImage; ImageError says what is wrong with it."""
-    return Frame(rgb_from_message(message), stamp_ns_of(message))
+def frame_from_message(message: Any, info: Any = None, *, rectified: bool = False) -> Frame:
+    """Return the frame of an Image or CompressedImage.
+
+    Args:
+        message: the image.
+        info: the CameraInfo of the camera, None where it is not known.
+        rectified: the image was rectified, as image_proc does.
+
+    Raises:
+        PeaceError: image or calibration cannot be used, or they do not belong together.
+    """
+    frame = Frame(rgb_from_message(message), stamp_ns_of(message))
+    if info is None:
+        return frame
+    return replace(frame, camera=camera_from_info(info, frame.size_px, rectified=rectified))
 
 
-def heatmap_from_image(message: Any) -> Heatmap:
-    """Return the heatmap of a mono8 Image; any other encoding is an ImageError."""
+def camera_info_topic(image_topic: str) -> str:
+    """Return the topic of the CameraInfo of an image topic: its sibling, as in image_transport."""
+    return image_topic.removesuffix('/compressed').rpartition('/')[0] + '/camera_info'
+
+
+def is_rectified(image_topic: str) -> bool:
+    """Return whether a topic holds rectified images by its name: ``image_rect``, or with more."""
+    name = image_topic.removesuffix('/compressed').rpartition('/')[2]
+    return 'rect' in name.split('_')
+
+
+def camera_from_info(info: Any, size_px: tuple[int, int], *, rectified: bool) -> Camera | None:
+    """Return the camera of a CameraInfo, None where it is not calibrated (focal length 0).
+
+    Args:
+        info: the message. K and D count for a raw image, P and R for a rectified one; both are
+            those of the whole sensor, of which binning and region of interest are read out.
+        size_px: width and height of the image that it came with.
+        rectified: see :func:`frame_from_message`.
+
+    Raises:
+        PeaceError: it cannot be that of the image.
+    """
+    matrix = np.reshape(info.p, (3, 4)) if rectified else np.reshape(info.k, (3, 3))
+    if matrix[0, 0] == 0.0:
+        return None
+    roi, binning = info.roi, (max(1, int(info.binning_x)), max(1, int(info.binning_y)))
+    part = (int(roi.width or info.width), int(roi.height or info.height))
+    told = part[0] // binning[0], part[1] // binning[1]
+    if told != size_px:
+        raise ImageError(
+            f'camera_info describes {told[0]} x {told[1]} px, the image has {size_px[0]} x '
+            f'{size_px[1]} px: calibrate the camera at the size that it publishes'
+        )
+    focal = (float(matrix[axis, axis]) / binning[axis] for axis in (0, 1))
+    offsets = int(roi.x_offset), int(roi.y_offset)
+    # Pixel centres are whole numbers, before binning and after it.
+    centre = (
+        (float(matrix[axis, 2]) - offsets[axis] + 0.5) / binning[axis] - 0.5 for axis in (0, 1)
+    )
+    bends = not rectified and any(info.d)
+    distortion = Distortion(info.distortion_model, tuple(map(float, info.d))) if bends else None
+    turn = tuple(map(float, info.r)) if rectified and any(info.r) else UPRIGHT
+    camera = Camera(*size_px, _pair(focal), _pair(centre), distortion, turn)
+    check_lens(camera)
+    return camera
+
+
+def _pair(values: Iterable[float]) -> tuple[float, float]:
+    first, second = values
+    return first, second
+
+
+def heatmap_from_image(message: Any, info: Any = None) -> Heatmap:
+    """Return the heatmap of a mono8 Image; any other encoding is an ImageError.
+
+    Args:
+        message: the heatmap.
+        info: the CameraInfo of its frame as segmentation publishes it, None where it is not known.
+
+    Raises:
+        PeaceError: one of them cannot be used.
+    """
     if message.encoding != 'mono8':
         raise ImageError(f'heatmap encoding {message.encoding!r}: publish it as mono8')
     levels = pixels_from_raw(
         message.encoding, message.width, message.height, message.step, message.data
     )
-    return Heatmap(levels[:, :, 0].astype(np.float32) / np.float32(255.0), stamp_ns_of(message))
+    safety = levels[:, :, 0].astype(np.float32) / np.float32(255.0)
+    if info is None:
+        return Heatmap(safety, stamp_ns_of(message))
+    size_px = int(info.width), int(info.height)
+    camera = camera_from_info(info, size_px, rectified=not any(info.d))
+    return Heatmap(safety, stamp_ns_of(message), size_px, camera)
 
 
 def heatmap_levels(heatmap: Heatmap) -> NDArray[np.uint8]:

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
-from peace_ros.core.domain import Camera, ConfigurationError
+from peace_ros.core.domain import Camera, ConfigurationError, Mount
+from peace_ros.core.domain.geometry import mount_from_degrees
 from peace_ros.core.domain.parameters import ParameterInfo, ParameterSet, describe, parameter
 
 Group = tuple[str, type[Any]]
@@ -62,18 +63,56 @@ class SegmentationOptions(ParameterSet):
 
 @dataclass(frozen=True)
 class CameraOptions(ParameterSet):
-    """The nadir camera, as both its simulation and the landing see it."""
+    """The camera, as both its simulation and the landing see it.
+
+    Its size and field of view are those of its simulation, and of frames without ``camera_info``.
+    """
 
     camera_width: int = parameter(352, 'Width of the image', unit='px', low=16, high=8192)
     camera_height: int = parameter(352, 'Height of the image', unit='px', low=16, high=8192)
     camera_fov: float = parameter(
         73.0, 'Full horizontal field of view; pixels are square', unit='deg', low=5.0, high=150.0
     )
+    mount_roll: float = parameter(
+        0.0,
+        'Mount, turned about the forward axis of the vehicle: above 0 the camera looks to the left',
+        unit='deg',
+        low=-80.0,
+        high=80.0,
+    )
+    mount_pitch: float = parameter(
+        0.0,
+        'Mount, turned about the right axis: above 0 the camera looks ahead of the vehicle',
+        unit='deg',
+        low=-80.0,
+        high=80.0,
+    )
+    mount_yaw: float = parameter(
+        0.0,
+        'Mount, turned about the down axis: where the top of the image points; 0 is the nose, 90 '
+        'the right side of the vehicle, 180 its tail',
+        unit='deg',
+        low=-360.0,
+        high=360.0,
+    )
+    mount_x: float = parameter(
+        0.0, 'Place of the camera on the vehicle: forward', unit='m', low=-5.0, high=5.0
+    )
+    mount_y: float = parameter(0.0, 'The same, to the right', unit='m', low=-5.0, high=5.0)
+    mount_z: float = parameter(0.0, 'The same, down', unit='m', low=-5.0, high=5.0)
 
     @property
     def camera(self) -> Camera:
         """The camera that the options describe."""
         return Camera.from_degrees(self.camera_width, self.camera_height, self.camera_fov)
+
+    @property
+    def mount(self) -> Mount:
+        """How the options say that it is mounted."""
+        return mount_from_degrees(
+            (self.mount_roll, self.mount_pitch, self.mount_yaw),
+            (self.mount_x, self.mount_y, self.mount_z),
+        )
 
 
 @dataclass(frozen=True)
@@ -101,9 +140,9 @@ class LandingOptions(ParameterSet):
         False, 'Engage once, as soon as nothing prevents it; otherwise ~/engage is called'
     )
     registration: bool = parameter(
-        False,
-        'While the autopilot knows attitude and altitude but no position, carry the map on by '
-        'comparing camera images (subscribes to image)',
+        True,
+        'Compare camera images (subscribes to image): their scale checks the altitude, and while '
+        'the autopilot knows attitude and altitude but no position they carry the map on',
     )
     image_transport: str = parameter(
         'raw',
@@ -117,6 +156,12 @@ class LandingOptions(ParameterSet):
     )
     tf_parent: str = parameter('map', 'Local frame (ENU) of the pose in tf')
     tf_child: str = parameter('base_link', 'Frame of the vehicle in tf')
+    mount_source: str = parameter(
+        'parameters',
+        'How the camera is mounted: by the parameters mount_*, or by /tf_static from tf_child to '
+        'the optical frame (REP-103) that the images name in their header',
+        choices=('parameters', 'tf'),
+    )
 
 
 def groups_of(node: str) -> tuple[Group, ...]:

@@ -9,14 +9,14 @@ heatmap = pipeline.segment(read_image('photo.jpg'))
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import Camera, ConfigurationError, Frame, Heatmap, Prompt
+from peace_ros.core.domain import NADIR, Camera, ConfigurationError, Frame, Heatmap, Mount, Prompt
 from peace_ros.core.inference import Bundle, ClipEncoder
 from peace_ros.core.landing import LandingCore, LandingParameters
 from peace_ros.core.mapping import MapParameters
@@ -117,7 +117,8 @@ class Pipeline:
             BundleError: an answer of the networks cannot be used.
         """
         self._camera.check(frame)
-        return self.segmenter.segment(frame, prompt)
+        heatmap = self.segmenter.segment(frame, prompt)
+        return replace(heatmap, frame_size_px=frame.size_px, camera=frame.camera)
 
     def reset(self) -> None:
         """Forget the frames so far: the next one begins another sequence."""
@@ -163,12 +164,15 @@ def create_generator(parameters: PromptingParameters, log: Log = _LOG) -> Prompt
     return PromptGenerator(encoder, vocabularies, parameters)
 
 
-def create_landing(preset: Preset, camera: Camera) -> LandingCore:
+def create_landing(preset: Preset, camera: Camera, mount: Mount = NADIR) -> LandingCore:
     """Make the landing core of a preset for the frames of a camera.
 
     Raises:
         ConfigurationError: a value of the preset cannot be used.
     """
     return LandingCore(
-        preset.fill('landing', LandingParameters), camera, preset.fill('landing', MapParameters)
+        preset.fill('landing', LandingParameters),
+        camera,
+        preset.fill('landing', MapParameters),
+        mount,
     )

@@ -6,33 +6,49 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
+from importlib import import_module
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from peace_ros.core.domain import PeaceError
+from peace_ros.core.domain import ConfigurationError, Frame, PeaceError
 from peace_ros.core.landing import LandingCore
-from peace_ros.core.messages import depth_from_image, frame_from_message, heatmap_from_image
+from peace_ros.core.messages import (
+    camera_info_topic,
+    depth_from_image,
+    frame_from_message,
+    heatmap_from_image,
+    is_rectified,
+)
 from peace_ros.core.node_parameters import LandingOptions
-from peace_ros.nodes.qos import IMAGE_IN
+from peace_ros.core.transforms import StaticTransforms
+from peace_ros.nodes.qos import IMAGE_IN, LATCHED_IN, RESULT
 from peace_ros.nodes.runtime import PeaceNode
 
+FRAME_INFO = 'heatmap/frame_info'
+"""CameraInfo of the frame that the heatmap of this stamp covers: its size is that of the frame, and
+K is 0 where the frame is not calibrated."""
 _WAITING = 4
 """Messages that are kept until the next step; older ones are dropped."""
+_FRAME_INFOS = 64
+"""They may come before their heatmap, which is larger."""
 
 ImageMessage = Any
 """An Image or a CompressedImage; rclpy's messages have no types to check."""
 
 
-def subscribe_images(node: Node, transport: str, callback: Callable[[ImageMessage], None]) -> None:
-    """Subscribe to ``image`` (transport raw) or ``image/compressed`` (transport compressed).
+def subscribe_images(node: Node, transport: str, callback: Callable[[ImageMessage], None]) -> str:
+    """Subscribe to ``image`` (transport raw) or its ``/compressed``; return the name of ``image``.
 
-    The reliability may be overridden by the ROS parameters ``qos_overrides.<topic>...``.
+    As with image_transport, ``image`` is the name that is remapped, whatever the transport. The
+    reliability may be overridden by the ROS parameters ``qos_overrides.<topic>...``.
     """
+    base: str = node.resolve_topic_name('image')
     kind, topic = (
-        (CompressedImage, 'image/compressed') if transport == 'compressed' else (Image, 'image')
+        (CompressedImage, f'{base}/compressed') if transport == 'compressed' else (Image, base)
     )
     node.create_subscription(
         kind,
@@ -41,10 +57,55 @@ def subscribe_images(node: Node, transport: str, callback: Callable[[ImageMessag
         IMAGE_IN,
         qos_overriding_options=QoSOverridingOptions.with_default_policies(),
     )
+    return base
+
+
+def tf_message(parameter: str) -> Any:
+    """Return the message type of tf, which a parameter asks for.
+
+    Raises:
+        ConfigurationError: it is not installed.
+    """
+    try:
+        return import_module('tf2_msgs.msg').TFMessage
+    except ImportError as error:
+        raise ConfigurationError(
+            f'parameter {parameter} = tf needs the package tf2_msgs: install it with ROS, or leave '
+            f'{parameter} as it is by default'
+        ) from error
+
+
+class CalibratedImages:
+    """Images, and the ``camera_info`` beside them: its newest message is that of each image.
+
+    Args:
+        node: Subscribes.
+        transport: As for :func:`subscribe_images`.
+        callback: Gets each image message.
+    """
+
+    def __init__(
+        self, node: Node, transport: str, callback: Callable[[ImageMessage], None]
+    ) -> None:
+        self._info: CameraInfo | None = None
+        self._topic = subscribe_images(node, transport, callback)
+        node.create_subscription(
+            CameraInfo, camera_info_topic(self._topic), self._on_info, IMAGE_IN
+        )
+
+    def _on_info(self, message: CameraInfo) -> None:
+        self._info = message
+
+    def frame(self, message: ImageMessage) -> Frame:
+        """Return the frame of an image, with its camera; PeaceError says what is wrong."""
+        return frame_from_message(message, self._info, rectified=is_rectified(self._topic))
 
 
 class LandingInputs:
     """Heatmaps, and where they are given depth images and pictures: callbacks only store.
+
+    A heatmap does not show which camera took its frame: it waits for the ``heatmap/frame_info``
+    of its stamp, and is of no use without.
 
     Args:
         node: Subscribes, and says what is refused.
@@ -54,15 +115,25 @@ class LandingInputs:
     def __init__(self, node: PeaceNode, options: LandingOptions) -> None:
         self._node = node
         self._heatmaps: deque[Image] = deque(maxlen=_WAITING)
+        self._frame_infos: deque[CameraInfo] = deque(maxlen=_FRAME_INFOS)
         self._depths: deque[Image] = deque(maxlen=_WAITING)
         self._images: deque[ImageMessage] = deque(maxlen=_WAITING)
         node.create_subscription(Image, 'heatmap', self._on_heatmap, IMAGE_IN)
+        node.create_subscription(CameraInfo, FRAME_INFO, self._on_frame_info, RESULT)
         node.create_subscription(Image, 'depth', self._on_depth, IMAGE_IN)
+        self._vehicle = options.tf_child
+        self._transforms = StaticTransforms() if options.mount_source == 'tf' else None
+        if self._transforms is not None:
+            kind = tf_message('mount_source')
+            node.create_subscription(kind, '/tf_static', self._transforms.add, LATCHED_IN)
         if options.registration:
             subscribe_images(node, options.image_transport, self._on_image)
 
     def _on_heatmap(self, message: Image) -> None:
         self._heatmaps.append(message)
+
+    def _on_frame_info(self, message: CameraInfo) -> None:
+        self._frame_infos.append(message)
 
     def _on_depth(self, message: Image) -> None:
         self._depths.append(message)
@@ -75,11 +146,31 @@ class LandingInputs:
         inputs: tuple[tuple[str, deque[Any], Callable[[Any], None]], ...] = (
             ('image', self._images, lambda each: core.add_view(frame_from_message(each))),
             ('depth', self._depths, lambda each: core.add_depth(depth_from_image(each))),
-            ('heatmap', self._heatmaps, lambda each: core.add_heatmap(heatmap_from_image(each))),
         )
         for name, waiting, hand_on in inputs:
             while waiting:
                 self._hand_on(name, waiting.popleft(), hand_on)
+        while self._heatmaps:
+            info = self._frame_info_of(self._heatmaps[0])
+            if info is None and len(self._heatmaps) == 1:
+                return  # it may still come
+            self._hand_on('heatmap', self._heatmaps.popleft(), partial(self._add, core, info))
+
+    def _add(self, core: LandingCore, info: CameraInfo | None, message: Image) -> None:
+        if info is None:
+            core.reject_heatmap(f'no {FRAME_INFO} of its stamp says what took its frame')
+            return
+        if self._transforms is not None:
+            try:
+                core.place_camera(self._transforms.mount(self._vehicle, info.header.frame_id))
+            except ConfigurationError as error:
+                core.reject_heatmap(str(error))
+                raise
+        core.add_heatmap(heatmap_from_image(message, info))
+
+    def _frame_info_of(self, heatmap: Image) -> CameraInfo | None:
+        stamp = heatmap.header.stamp
+        return next((each for each in self._frame_infos if each.header.stamp == stamp), None)
 
     def _hand_on(self, name: str, message: Any, hand_on: Callable[[Any], None]) -> None:
         try:

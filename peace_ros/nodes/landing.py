@@ -45,9 +45,9 @@ class LandingNode(PeaceNode):
         super().__init__('landing', *groups_of('landing'), **options)
         self._options = self.filled(LandingOptions)
         self._landing = self.filled(LandingParameters)
-        self._core = LandingCore(
-            self._landing, self.filled(CameraOptions).camera, self.filled(MapParameters)
-        )
+        camera = self.filled(CameraOptions)
+        mount = None if self._options.mount_source == 'tf' else camera.mount
+        self._core = LandingCore(self._landing, camera.camera, self.filled(MapParameters), mount)
         self._lock = threading.RLock()
         """Guards the core: the engage service runs beside the timer."""
         self._sender: SetpointSender | None = None
@@ -110,7 +110,7 @@ class LandingNode(PeaceNode):
             stamp_ns = self._core.safety_map.stamp_ns
             map_age_s = inf if stamp_ns is None else (self.clock_ns() - stamp_ns) / 1e9
             return self._access.vehicle_problem or engagement_problem(
-                self._state, told, age_s, map_age_s, self._landing
+                self._state, told, age_s, map_age_s, self._landing, self._core.last_rejection
             )
 
     def begin(self) -> str:

@@ -13,10 +13,12 @@ from importlib import import_module
 from math import cos, sin
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PointStamped, PoseStamped, Twist, TwistStamped
+from sensor_msgs.msg import CameraInfo
 
-from peace_ros.core.domain import Pose, Prompt, Setpoint, Site
+from peace_ros.core.domain import Camera, Pose, Prompt, Setpoint, Site
 from peace_ros.core.domain.geometry import (
     attitude_ned_frd_to_enu_flu,
     ned_to_enu,
@@ -51,6 +53,23 @@ def prompt_to_message(prompt: Prompt) -> DiagnosticArray:
     """Return a prompt as diagnostics, its template as the sentence."""
     pairs = prompt_pairs(prompt).items()
     return diagnostic_array(prompt.stamp_ns, 'prompt', OK, prompt.template, pairs)
+
+
+def camera_info(
+    size_px: tuple[int, int], camera: Camera | None, at_ns: int, frame_id: str
+) -> CameraInfo:
+    """Return the CameraInfo of pictures of a size; K is 0 where their camera is not calibrated."""
+    message = CameraInfo(header=header(at_ns, frame_id), width=size_px[0], height=size_px[1])
+    if camera is not None:
+        if camera.distortion is not None:
+            message.distortion_model = camera.distortion.model
+            message.d = list(camera.distortion.coefficients)
+        else:
+            message.distortion_model = 'plumb_bob'
+        message.k = camera.matrix.ravel()
+        message.r = list(camera.rectification)
+        message.p = np.hstack((camera.matrix, np.zeros((3, 1)))).ravel()
+    return message
 
 
 def pose_to_message(pose: Pose, frame_id: str = LOCAL_FRAME) -> PoseStamped:

@@ -8,7 +8,7 @@ best-effort images larger than its shared-memory segment (about 549 kB); ``confi
 enlarges the segment of the process that publishes them.
 """
 
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 # A profile with a depth is keep-last, reliable and volatile where it does not say otherwise.
 
@@ -17,6 +17,9 @@ IMAGE_OUT = QoSProfile(depth=1)
 
 IMAGE_IN = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Frames and heatmaps that we take; the oldest is dropped."""
+
+LATCHED_IN = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""/tf_static: what was published before we subscribed counts too."""
 
 POSE = QoSProfile(depth=20)
 """Poses: each counts, since a heatmap is projected with the pose at its stamp."""

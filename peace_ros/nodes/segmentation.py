@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from peace_ros.core.domain import Frame, Heatmap, PeaceError, Prompt
-from peace_ros.core.messages import frame_from_message, prompt_from_message, stamp_ns_of
+from peace_ros.core.messages import prompt_from_message, stamp_ns_of
 from peace_ros.core.node_parameters import SegmentationOptions, groups_of
 from peace_ros.core.pipeline import Pipeline
 from peace_ros.core.prompting import categories_of, resolve_template
@@ -24,11 +24,12 @@ from peace_ros.core.segmentation import (
     draw_overlay,
     family_of,
 )
-from peace_ros.nodes.inputs import ImageMessage, subscribe_images
+from peace_ros.nodes.inputs import FRAME_INFO, CalibratedImages, ImageMessage
 from peace_ros.nodes.messages import (
     ERROR,
     OK,
     WARN,
+    camera_info,
     diagnostic_array,
     heatmap_to_image,
     jpeg_message,
@@ -65,13 +66,14 @@ class SegmentationNode(PeaceNode):
         self._board = PromptBoard()
         self._prepared: set[str] = set()
         self._heatmap_out = self.create_publisher(Image, 'heatmap', IMAGE_OUT)
+        self._frame_info_out = self.create_publisher(CameraInfo, FRAME_INFO, RESULT)
         self._overlay_out = self.create_publisher(CompressedImage, 'overlay/compressed', IMAGE_OUT)
         self._diagnostics_out = self.create_publisher(DiagnosticArray, '/diagnostics', RESULT)
         self._preparer = NewestWorker(self._prepare, self._complain, self.fail, 'prepare')
         self._worker = NewestWorker(self._segment, self._complain, self.fail, _NAME)
         if self._static is None:
             self.create_subscription(DiagnosticArray, 'prompt', self._on_prompt, RESULT)
-        subscribe_images(self, self._options.image_transport, self._on_image)
+        self._images = CalibratedImages(self, self._options.image_transport, self._on_image)
         waits = 'waits for prompts' if self._static is None else 'static'
         self.get_logger().info(f'ready: template {template!r} ({waits})')
 
@@ -119,18 +121,21 @@ class SegmentationNode(PeaceNode):
             return
         prompt, own = chosen
         began = time.monotonic()
-        frame = frame_from_message(message)
+        frame, frame_id = self._images.frame(message), message.header.frame_id
         heatmap = self._pipeline.heatmap(frame, prompt)
-        self._heatmap_out.publish(heatmap_to_image(heatmap, message.header.frame_id))
+        self._frame_info_out.publish(
+            camera_info(frame.size_px, frame.camera, frame.stamp_ns, frame_id)
+        )
+        self._heatmap_out.publish(heatmap_to_image(heatmap, frame_id))
         work_s = time.monotonic() - began
         if self._overlay_out.get_subscription_count() > 0:
-            self._publish_overlay(frame, heatmap)
+            self._publish_overlay(frame, heatmap, frame_id)
         self._report(frame.stamp_ns, prompt, own=own, work_s=work_s)
 
-    def _publish_overlay(self, frame: Frame, heatmap: Heatmap) -> None:
+    def _publish_overlay(self, frame: Frame, heatmap: Heatmap, frame_id: str) -> None:
         overlay = draw_overlay(frame, heatmap, self._options.overlay_threshold)
         self._overlay_out.publish(
-            jpeg_message(overlay, frame.stamp_ns, self._options.overlay_quality)
+            jpeg_message(overlay, frame.stamp_ns, self._options.overlay_quality, frame_id)
         )
 
     def _report(self, at_ns: int, prompt: Prompt, *, own: bool, work_s: float) -> None:

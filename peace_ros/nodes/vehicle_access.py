@@ -12,13 +12,14 @@ from typing import Any
 from geometry_msgs.msg import PoseStamped, Twist
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.core.domain import ConfigurationError, Pose, Setpoint, VehicleError
+from peace_ros.core.domain import Pose, Setpoint, VehicleError
 from peace_ros.core.landing import Decision, State
 from peace_ros.core.messages import pose_from_message, pose_from_transform
 from peace_ros.core.node_parameters import LandingOptions
 from peace_ros.core.vehicle import VehicleLink, VehicleParameters, check_access, open_vehicle
 from peace_ros.nodes.connection import Connection
 from peace_ros.nodes.handover import AfterHandover
+from peace_ros.nodes.inputs import tf_message
 from peace_ros.nodes.qos import COMMAND, POSE_IN
 from peace_ros.nodes.runtime import PeaceNode
 from peace_ros.nodes.twist_link import TwistLink
@@ -169,21 +170,14 @@ class VehicleAccess:
         if options.pose_source == 'topic':
             self._node.create_subscription(PoseStamped, 'pose', self._on_pose, POSE_IN)
             return
-        try:
-            from tf2_msgs.msg import TFMessage
-        except ImportError as error:
-            raise ConfigurationError(
-                'parameter pose_source = tf needs the package tf2_msgs: install it with ROS, or '
-                'choose topic'
-            ) from error
 
-        def on_tf(message: TFMessage) -> None:
+        def on_tf(message: Any) -> None:
             for each in message.transforms:
                 names = (each.header.frame_id.lstrip('/'), each.child_frame_id.lstrip('/'))
                 if names == (options.tf_parent, options.tf_child):
                     self._take(pose_from_transform, each)
 
-        self._node.create_subscription(TFMessage, '/tf', on_tf, POSE_IN)
+        self._node.create_subscription(tf_message('pose_source'), '/tf', on_tf, POSE_IN)
 
     def _on_pose(self, message: PoseStamped) -> None:
         self._take(pose_from_message, message)

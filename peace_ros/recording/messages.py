@@ -4,12 +4,8 @@
 
 from __future__ import annotations
 
-from math import atan
-from typing import Any
-
 import numpy as np
 
-from peace_ros.core.domain import RecordingError
 from peace_ros.core.messages import MessageBuilder
 from peace_ros.recording.bag import TYPESTORE
 
@@ -30,18 +26,3 @@ heatmap_to_image = _BUILD.heatmap
 jpeg_message = _BUILD.jpeg
 diagnostic_array = _BUILD.diagnostic_array
 pose_stamped = _BUILD.pose_stamped
-
-
-def fov_x_rad_of(camera_info: Any) -> float:
-    """Return the full horizontal field of view of a CameraInfo.
-
-    Raises:
-        RecordingError: it was never calibrated (focal length 0).
-    """
-    focal_px, width_px = float(camera_info.k[0]), int(camera_info.width)
-    if not focal_px > 0.0 or width_px < 1:
-        raise RecordingError(
-            f'camera_info with focal length {focal_px} px and width {width_px} px is not '
-            'calibrated: give --fov'
-        )
-    return 2.0 * atan(width_px / (2.0 * focal_px))

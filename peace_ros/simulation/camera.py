@@ -12,14 +12,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import Camera, Label, Pose, is_safe
-from peace_ros.core.domain.geometry import ground_to_image
+from peace_ros.core.domain import NADIR, Camera, Label, Mount, Pose, WorldError, is_safe
+from peace_ros.core.domain.camera import EQUIDISTANT
+from peace_ros.core.domain.geometry import camera_pose, ground_to_camera, ground_to_image
 from peace_ros.simulation.world import World
 
 _LOWEST_M = 0.2
 """The lens of a vehicle that stands on the ground is about this high."""
 _SKY_RGB = (168, 176, 184)
 _HORIZON = 1e-9
+_CHECKED = 16
+"""One of so many rows is projected back, to see that the distortion could be inverted."""
+_INVERSION_PX = 0.01
+_PRECISE = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-10)
+_UNDISTORT = getattr(cv2, 'undistortPointsIter', cv2.undistortPoints)
+"""OpenCV 4.6 takes a precision only in the former."""
 
 
 class CameraView(NamedTuple):
@@ -34,15 +41,20 @@ class CameraView(NamedTuple):
 
 
 class NadirCamera:
-    """A pinhole camera that looks along body-down over a world, with true attitude.
+    """A camera over a world, with true attitude: nadir by default, or mounted otherwise.
+
+    Its lens may have distortion. The directions of its pixels are found by inverting the model,
+    while the companion only ever applies it: an error in one of them shows.
 
     The world is prepared once at several resolutions (each half of the one before, by averaging
     areas), so that a view from high up does not alias.
     """
 
-    def __init__(self, world: World, camera: Camera) -> None:
+    def __init__(self, world: World, camera: Camera, mount: Mount = NADIR) -> None:
         self.world = world
         self.camera = camera
+        self.mount = mount
+        self._directions = None if camera.distortion is None else _directions(camera)
         self._levels = [np.ascontiguousarray(world.image_rgb)]
         while min(self._levels[-1].shape[:2]) >= 4:
             height, width = self._levels[-1].shape[:2]
@@ -57,8 +69,11 @@ class NadirCamera:
 
         Altitudes under 0.2 m are seen from 0.2 m.
         """
+        pose = camera_pose(self.mount, pose)
         if pose.altitude_agl_m < _LOWEST_M:
             pose = replace(pose, altitude_agl_m=_LOWEST_M)
+        if self._directions is not None:
+            return self._bent_view(self._directions, pose)
         world_from_image = self._world_from_ground() @ np.linalg.inv(
             ground_to_image(self.camera, pose)
         )
@@ -78,6 +93,35 @@ class NadirCamera:
             if labels is not None:
                 labels[sky] = Label.UNLABELED
         return CameraView(image, labels, mirrored)
+
+    def _bent_view(self, directions: NDArray[np.float64], pose: Pose) -> CameraView:
+        """Return the view through a lens with distortion, ray by ray."""
+        world_from_camera = self._world_from_ground() @ np.linalg.inv(
+            ground_to_camera(self.camera, pose)
+        )
+        shape = self.camera.height_px, self.camera.width_px
+        mapped = (world_from_camera @ directions.reshape(3, -1)).reshape(3, *shape)
+        sky = ~(mapped[2] > _HORIZON)  # also true where the lens shows no direction
+        u, v = (
+            np.where(sky, -1.0, each / np.where(sky, 1.0, mapped[2])).astype(np.float32)
+            for each in mapped[:2]
+        )
+        height, width = self.world.image_rgb.shape[:2]
+        beyond = (u < -0.5) | (v < -0.5) | (u > width - 0.5) | (v > height - 0.5)
+        level = self._level(world_from_camera @ np.linalg.inv(self.camera.matrix))
+        (sx, _, tx), (_, sy, ty), _ = self._to_level(level)
+        at_level = (u * np.float32(sx) + np.float32(tx), v * np.float32(sy) + np.float32(ty))
+        image = cv2.remap(
+            self._levels[level], *at_level, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT
+        )
+        image[sky] = _SKY_RGB
+        labels = None
+        if self.world.labels is not None:
+            labels = cv2.remap(
+                self.world.labels, u, v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REFLECT
+            )
+            labels[sky] = Label.UNLABELED
+        return CameraView(np.asarray(image, np.uint8), labels, bool((sky | beyond).any()))
 
     def labels_at(self, north_m: float, east_m: float, radius_m: float) -> NDArray[np.uint8] | None:
         """Return the labels (N,) of the pixels whose centres lie within a radius of a place.
@@ -183,6 +227,49 @@ class NadirCamera:
         v = np.arange(self.camera.height_px)[:, None]
         a, b, c = world_from_image[2]
         return np.asarray(a * u + b * v + c <= _HORIZON, np.bool_)
+
+
+def _directions(camera: Camera) -> NDArray[np.float64]:
+    """Return 3 x height x width: right, down and 1 along the view, of each pixel of a bent lens.
+
+    Raises:
+        WorldError: the distortion is not one-to-one over the whole picture.
+    """
+    found = np.ones((3, camera.height_px, camera.width_px))
+    for row in range(camera.height_px):
+        pixels = np.full((camera.width_px, 1, 2), float(row))
+        pixels[:, 0, 0] = np.arange(camera.width_px)
+        found[:2, row] = _undistorted(camera, pixels).T
+        if row % _CHECKED == 0 and not np.allclose(
+            _distorted(camera, found[:, row]), pixels[:, 0], atol=_INVERSION_PX
+        ):
+            raise WorldError(
+                f'{camera.distortion} cannot be inverted over {camera.width_px} x '
+                f'{camera.height_px} px: give a weaker distortion or a narrower field of view'
+            )
+    return found
+
+
+def _undistorted(camera: Camera, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return N x 2 tangents of pixels (N, 1, 2)."""
+    coefficients = np.array(camera.distortion.coefficients if camera.distortion else ())
+    if camera.distortion is not None and camera.distortion.model == EQUIDISTANT:
+        plane = cv2.fisheye.undistortPoints(pixels, camera.matrix, coefficients)
+    else:
+        plane = _UNDISTORT(
+            pixels, camera.matrix, coefficients, R=np.eye(3), P=np.eye(3), criteria=_PRECISE
+        )
+    return np.asarray(plane, np.float64).reshape(-1, 2)
+
+
+def _distorted(camera: Camera, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return N x 2 pixels of directions (3, N)."""
+    fisheye = camera.distortion is not None and camera.distortion.model == EQUIDISTANT
+    model = cv2.fisheye if fisheye else cv2
+    coefficients = np.array(camera.distortion.coefficients if camera.distortion else ())
+    zero, points = np.zeros((3, 1)), directions.T.reshape(-1, 1, 3)
+    seen, _ = model.projectPoints(points, zero, zero, camera.matrix, coefficients)
+    return np.asarray(seen, np.float64).reshape(-1, 2)
 
 
 def _mirrored(index: NDArray[np.float64], size: int) -> NDArray[np.intp]:

@@ -9,20 +9,14 @@ import subprocess
 import sys
 
 import pytest
-from typer.testing import CliRunner
 
 from peace_ros import __version__
-from peace_ros.cli.main import app
 from peace_ros.core.resources import models_dir
 
 SMALL_BUNDLES = ('clip-small', 'clipseg-small')
 
 
-def peace(*words: str):
-    return CliRunner().invoke(app, list(words))
-
-
-def test_version_and_help() -> None:
+def test_version_and_help(peace) -> None:
     assert peace('--version').output.strip() == f'peace_ros {__version__}'
     told = peace('--help').output
     assert all(verb in told for verb in ('demo', 'replay', 'models'))
@@ -40,8 +34,8 @@ def test_version_and_help() -> None:
         ('models fetch', '--index --out'),
     ],
 )
-def test_the_verbs_have_their_options(verb, options) -> None:
-    told = CliRunner().invoke(app, [*verb.split(), '--help'], env={'COLUMNS': '200'}).output
+def test_the_verbs_have_their_options(peace, verb, options) -> None:
+    told = peace(*verb.split(), '--help', env={'COLUMNS': '200'}).output
     for option in options.split():
         assert option in told
 
@@ -70,7 +64,7 @@ def test_help_imports_nothing_heavy() -> None:
         (('models', 'verify', 'no-such'), 'no-such'),
     ],
 )
-def test_what_cannot_be_used_is_refused_in_one_sentence(words, told) -> None:
+def test_what_cannot_be_used_is_refused_in_one_sentence(peace, words, told) -> None:
     result = peace(*words)
     assert result.exit_code == 2
     assert told in result.stderr
@@ -78,7 +72,7 @@ def test_what_cannot_be_used_is_refused_in_one_sentence(words, told) -> None:
     assert 'Traceback' not in result.output
 
 
-def test_the_bundled_models_are_listed_shown_and_whole() -> None:
+def test_the_bundled_models_are_listed_shown_and_whole(peace) -> None:
     listed = peace('models', 'list').output
     for name in SMALL_BUNDLES:
         assert name in listed
@@ -86,7 +80,7 @@ def test_the_bundled_models_are_listed_shown_and_whole() -> None:
         assert '"provenance"' in peace('models', 'info', name).output
 
 
-def test_own_bundles_are_listed_too_and_a_broken_one_is_said(tmp_path, monkeypatch) -> None:
+def test_own_bundles_are_listed_too_and_a_broken_one_is_said(peace, tmp_path, monkeypatch) -> None:
     own = shutil.copytree(models_dir() / SMALL_BUNDLES[0], tmp_path / 'my-own')
     (tmp_path / 'broken').mkdir()
     (tmp_path / 'broken' / 'manifest.json').write_text('{')
@@ -100,7 +94,7 @@ def test_own_bundles_are_listed_too_and_a_broken_one_is_said(tmp_path, monkeypat
     assert 'files are whole' in peace('models', 'verify', 'my-own').output
 
 
-def test_a_verb_that_is_handed_on_refuses_in_one_sentence(monkeypatch) -> None:
+def test_a_verb_that_is_handed_on_refuses_in_one_sentence(peace, monkeypatch) -> None:
     monkeypatch.delenv('PEACE_MODELS_INDEX', raising=False)
     result = peace('models', 'fetch', 'clipseg')
     assert result.exit_code == 2

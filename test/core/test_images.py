@@ -56,7 +56,11 @@ def test_reads_rgb_without_a_copy():
 @pytest.mark.parametrize(
     ('fields', 'words'),
     [
-        (('yuv422', 4, 4, 8, bytes(32)), ['yuv422', 'rgb8', 'publish']),
+        (('yuv444', 4, 4, 12, bytes(48)), ['yuv444', 'rgb8', 'publish']),
+        (('yuyv', 5, 4, 10, bytes(40)), ['5 x 4', 'even']),
+        (('nv12', 4, 3, 4, bytes(18)), ['4 x 3', 'even']),
+        (('nv12', 4, 4, 4, bytes(16)), ['16', '24', 'whole']),
+        (('mono16', 4, 4, 7, bytes(28)), ['step 7', '8']),
         (('', 4, 4, 12, bytes(48)), ["''", 'publish']),
         (('rgb8', 0, 4, 0, b''), ['0 x 4', 'empty']),
         (('rgb8', 4, 0, 12, b''), ['4 x 0', 'empty']),
@@ -112,10 +116,100 @@ def test_refuses_what_is_no_image(data):
         rgb_from_compressed('jpeg', data)
 
 
-def test_refuses_16_bits():
-    deep = cv2.imencode('.png', np.full((4, 4), 4000, np.uint16))[1].tobytes()
-    with pytest.raises(ImageError, match='8 bits per colour'):
-        rgb_from_compressed('png', deep)
+def padded(rows: np.ndarray, padding: int = 6) -> tuple[int, bytes]:
+    """Return the step and the bytes of rows of bytes with padding behind each."""
+    lines = np.ascontiguousarray(rows).view(np.uint8).reshape(rows.shape[0], -1)
+    wide = np.pad(lines, ((0, 0), (0, padding)), constant_values=99)
+    return wide.shape[1], wide.tobytes()
+
+
+def smooth() -> np.ndarray:
+    """Red grows to the right, green downwards, blue to the left; no colour changes quickly."""
+    right, down = np.linspace(40.0, 210.0, 64), np.linspace(60.0, 200.0, 48)
+    return np.dstack(
+        np.broadcast_arrays(right[None, :], down[:, None], right[::-1][None, :])
+    ).astype(np.uint8)
+
+
+def yuv_of(rgb: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return Y, U, V of ITU-R BT.601 with their usual limits."""
+    r, g, b = (rgb[..., each].astype(float) for each in range(3))
+    y = 16 + 0.257 * r + 0.504 * g + 0.098 * b
+    u = 128 - 0.148 * r - 0.291 * g + 0.439 * b
+    v = 128 + 0.439 * r - 0.368 * g - 0.071 * b
+    return tuple(np.rint(each).astype(np.uint8) for each in (y, u, v))
+
+
+def raw_of(encoding: str, rgb: np.ndarray) -> np.ndarray:
+    y, u, v = yuv_of(rgb)
+    height, width = y.shape
+    if encoding in {'nv12', 'nv21'}:
+        pairs = (u, v) if encoding == 'nv12' else (v, u)
+        colours = np.dstack([each[::2, ::2] for each in pairs]).reshape(height // 2, width)
+        return np.vstack((y, colours))
+    shared = np.empty_like(y)
+    shared[:, ::2], shared[:, 1::2] = u[:, ::2], v[:, ::2]
+    order = (y, shared) if encoding in {'yuyv', 'yuv422_yuy2'} else (shared, y)
+    return np.dstack(order).reshape(height, 2 * width)
+
+
+@pytest.mark.parametrize('encoding', ['yuyv', 'yuv422_yuy2', 'uyvy', 'yuv422', 'nv12', 'nv21'])
+def test_reads_what_video_cameras_publish(encoding):
+    step, data = padded(raw_of(encoding, smooth()))
+    read = rgb_from_raw(encoding, 64, 48, step, data)
+    assert np.abs(read.astype(int) - smooth()).max() <= 10
+
+
+@pytest.mark.parametrize('pattern', ['rggb', 'bggr', 'gbrg', 'grbg'])
+@pytest.mark.parametrize('bits', [8, 16])
+def test_reads_the_bayer_pattern_that_begins_as_it_is_named(pattern, bits):
+    rgb = smooth()
+    mosaic = np.empty((48, 64), np.uint16 if bits == 16 else np.uint8)
+    for place, colour in enumerate(pattern):
+        row, column = divmod(place, 2)
+        mosaic[row::2, column::2] = rgb[row::2, column::2, 'rgb'.index(colour)]
+    step, data = padded(mosaic * 256 if bits == 16 else mosaic)
+    read = rgb_from_raw(f'bayer_{pattern}{bits}', 64, 48, step, data)
+    assert np.abs(read[2:-2, 2:-2].astype(int) - rgb[2:-2, 2:-2]).max() <= 6
+
+
+@pytest.mark.parametrize('is_bigendian', [False, True])
+@pytest.mark.parametrize('used_bits', [10, 12, 14, 16])
+@pytest.mark.parametrize('encoding', ['mono16', 'rgb16', 'bgra16'])
+def test_16_bits_are_scaled_by_the_bits_that_are_used(encoding, used_bits, is_bigendian):
+    rgb = smooth()
+    samples = {'mono16': rgb[..., :1], 'rgb16': rgb, 'bgra16': rgb[..., [2, 1, 0, 0]]}[encoding]
+    deep = (samples.astype(np.uint16) << (used_bits - 8)).astype('>u2' if is_bigendian else '<u2')
+    step, data = padded(deep)
+    read = rgb_from_raw(encoding, 64, 48, step, data, is_bigendian=is_bigendian)
+    expected = np.repeat(rgb[..., :1], 3, axis=2) if encoding == 'mono16' else rgb
+    np.testing.assert_array_equal(read, expected)
+
+
+def test_a_dark_picture_of_16_bits_stays_dark_and_some_bright_pixels_do_not_darken_it():
+    dark = np.random.default_rng(1).integers(0, 9, (48, 64)).astype('<u2')
+    assert rgb_from_raw('mono16', 64, 48, 128, dark.tobytes()).max() <= 2
+    twelve = (smooth()[..., 0].astype('<u2') << 4).astype('<u2')
+    bright = twelve.copy()
+    bright[0, :3] = 65_535
+    whole, spotted = (
+        rgb_from_raw('mono16', 64, 48, 128, each.tobytes()) for each in (twelve, bright)
+    )
+    np.testing.assert_array_equal(whole[1:], spotted[1:])
+
+
+def deep_png(image: np.ndarray) -> bytes:
+    return cv2.imencode('.png', image.astype(np.uint16) << 4)[1].tobytes()
+
+
+def test_a_png_of_16_bits_is_scaled_too():
+    read = rgb_from_compressed('png', deep_png(smooth()[..., ::-1]))
+    np.testing.assert_array_equal(read, smooth())
+    grey = rgb_from_compressed('16UC1; png compressed', deep_png(smooth()[..., 0]))
+    np.testing.assert_array_equal(grey, np.repeat(smooth()[..., :1], 3, axis=2))
+    whole = deep_png(smooth())
+    with pytest.raises(ImageError, match=r'damaged|truncated'):
+        rgb_from_compressed('png', whole[: len(whole) // 2])
 
 
 def test_refuses_a_damaged_png():

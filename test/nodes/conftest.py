@@ -17,9 +17,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, Image
 
+from peace_ros.core.domain import Camera, Heatmap
 from peace_ros.core.vehicle import VehicleParameters, open_vehicle
-from peace_ros.nodes.messages import image_message
+from peace_ros.nodes import qos
+from peace_ros.nodes.inputs import FRAME_INFO
+from peace_ros.nodes.messages import camera_info, heatmap_to_image, image_message
 from peace_ros.nodes.runtime import PeaceNode
 from peace_ros.simulation.demo.pilot import Pilot
 
@@ -37,6 +41,22 @@ def ros() -> Iterator[None]:
     rclpy.init(args=[], signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
     yield
     rclpy.try_shutdown()
+
+
+class Heatmaps:
+    """Publishes heatmaps as segmentation does, with what took their frames."""
+
+    def __init__(self, heatmaps: Any, frame_infos: Any) -> None:
+        self.heatmaps = heatmaps
+        self.frame_infos = frame_infos
+        self.frame_size_px: tuple[int, int] | None = (352, 352)
+        """None: nothing says what took the frames."""
+        self.camera: Camera | None = None
+
+    def publish(self, safety: np.ndarray, at_ns: int) -> None:
+        if self.frame_size_px is not None:
+            self.frame_infos.publish(camera_info(self.frame_size_px, self.camera, at_ns, 'optical'))
+        self.heatmaps.publish(heatmap_to_image(Heatmap(safety, at_ns)))
 
 
 class Bench:
@@ -77,6 +97,13 @@ class Bench:
         publisher = self.peer.create_publisher(kind, topic, profile)
         self.until(lambda: publisher.get_subscription_count() > 0)
         return publisher
+
+    def offer_heatmaps(self) -> Heatmaps:
+        """Return a publisher of heatmaps once the landing node listens."""
+        return Heatmaps(
+            self.offer(Image, 'heatmap', qos.IMAGE_OUT),
+            self.offer(CameraInfo, FRAME_INFO, qos.RESULT),
+        )
 
     def until(
         self,

@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, Twist, TwistStamped
-from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from peace_ros.core.domain import ConfigurationError, Heatmap, Pose
+from peace_ros.core.domain import Camera, ConfigurationError, Pose
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
-from peace_ros.nodes.messages import heatmap_to_image, pose_to_message
+from peace_ros.nodes.messages import pose_to_message
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 
@@ -28,7 +27,7 @@ class Flight:
     def __init__(self, bench, node, safety=0.97):
         self.node = node
         self.poses = bench.offer(PoseStamped, 'pose', qos.POSE)
-        self.heatmaps = bench.offer(Image, 'heatmap', qos.IMAGE_OUT)
+        self.heatmaps = bench.offer_heatmaps()
         self.safety = np.full((88, 88), safety, np.float32)
         self.altitude_m = 100.0
         self.has_heatmaps = True
@@ -38,7 +37,7 @@ class Flight:
         pose = Pose(at_ns, 0.0, 0.0, -self.altitude_m, LEVEL, self.altitude_m)
         self.poses.publish(pose_to_message(pose))
         if self.has_heatmaps:
-            self.heatmaps.publish(heatmap_to_image(Heatmap(self.safety, at_ns)))
+            self.heatmaps.publish(self.safety, at_ns)
 
 
 def call(bench, name, doing=None):
@@ -186,3 +185,27 @@ def call_failed(bench, doing):
         doing()
         time.sleep(0.02)
     return future.result()
+
+
+@pytest.mark.parametrize(
+    ('size_px', 'reason'),
+    [
+        ((640, 360), ('640 x 360 px', '352 x 352 px', 'camera_info')),
+        (None, ('heatmap/frame_info',)),
+    ],
+)
+def test_engages_only_when_it_is_known_what_took_the_frames(bench, size_px, reason):
+    node = bench.run(LandingNode, interface='twist')
+    flight = Flight(bench, node)
+    flight.heatmaps.frame_size_px = size_px
+    bench.until(
+        lambda: 'rejected' in node.check_engagement(),
+        flight,
+    )
+    answer = call(bench, 'engage', flight)
+    assert not answer.success
+    for words in reason:
+        assert words in answer.message
+    flight.heatmaps.frame_size_px = (640, 360)
+    flight.heatmaps.camera = Camera.from_degrees(640, 360, 90.0)
+    bench.until(lambda: call(bench, 'engage', flight).success, flight)

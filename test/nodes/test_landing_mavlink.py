@@ -8,13 +8,10 @@ import threading
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from peace_ros.core.domain import Heatmap
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
-from peace_ros.nodes.messages import heatmap_to_image
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim, Mode
 
 CLIMB_M = 30.0
@@ -24,12 +21,12 @@ def test_a_landing_from_refusal_to_takeover(bench, values_of, take_off):
     statuses = bench.heard(DiagnosticArray, 'landing/status', qos.RESULT)
     with AutopilotSim(AutopilotParameters(port=0, speed=25.0)) as sim:
         node = bench.run(LandingNode, mavlink=sim.url, safe_altitude_m=20.5)
-        heatmaps = bench.offer(Image, 'heatmap', qos.IMAGE_OUT)
+        heatmaps = bench.offer_heatmaps()
         safety = np.full((88, 88), 0.97, np.float32)
         client = bench.peer.create_client(Trigger, '/landing/engage')
 
         def see() -> None:
-            heatmaps.publish(heatmap_to_image(Heatmap(safety, node.clock_ns())))
+            heatmaps.publish(safety, node.clock_ns())
 
         def engage() -> Trigger.Response:
             future = client.call_async(Trigger.Request())

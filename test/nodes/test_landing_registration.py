@@ -12,11 +12,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from peace_ros.core.domain import Camera, Heatmap
+from peace_ros.core.domain import Camera
 from peace_ros.core.landing import LandingCore
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
-from peace_ros.nodes.messages import heatmap_to_image, image_message
+from peace_ros.nodes.messages import image_message
 from peace_ros.simulation import NadirCamera, draw_world
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
 
@@ -46,7 +46,7 @@ def test_images_reach_the_core_with_their_stamps_and_bad_ones_are_passed_over(
 
 
 def test_no_images_are_asked_for_otherwise(bench):
-    node = bench.run(LandingNode, interface='twist')
+    node = bench.run(LandingNode, interface='twist', registration=False)
     assert not [each for each in node.subscriptions if each.topic_name == '/image']
 
 
@@ -68,7 +68,8 @@ class Flight:
             camera_height=256,
             safe_altitude_m=20.5,
         )
-        self.heatmaps = bench.offer(Image, 'heatmap', qos.IMAGE_OUT)
+        self.heatmaps = bench.offer_heatmaps()
+        self.heatmaps.frame_size_px = (256, 256)
         self.images = bench.offer(Image, 'image', qos.IMAGE_OUT) if registration else None
         self.client = bench.peer.create_client(Trigger, '/landing/engage')
         bench.until(self.client.service_is_ready)
@@ -80,7 +81,7 @@ class Flight:
             noisy = np.clip(clean + self.random.normal(0.0, 2.0, clean.shape), 0.0, 255.0)
             self.images.publish(image_message(noisy.astype(np.uint8), 'rgb8', at_ns))
         safety = self.random.uniform(0.95, 0.99, (88, 88)).astype(np.float32)
-        self.heatmaps.publish(heatmap_to_image(Heatmap(safety, at_ns)))
+        self.heatmaps.publish(safety, at_ns)
 
     def engage(self):
         future = self.client.call_async(Trigger.Request())

@@ -15,13 +15,10 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from peace_ros.core.domain import Heatmap
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
-from peace_ros.nodes.messages import heatmap_to_image
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim, commands
 from peace_ros.simulation.autopilot.faults import inject
 
@@ -65,10 +62,10 @@ def engaging(bench, hovering):
     def start(**parameters):
         node = bench.run(LandingNode, mavlink=hovering.tcp_url, safe_altitude_m=20.5, **parameters)
 
-        heatmaps = bench.offer(Image, 'heatmap', qos.IMAGE_OUT)
+        heatmaps = bench.offer_heatmaps()
 
         def see() -> None:
-            heatmaps.publish(heatmap_to_image(Heatmap(SAFETY, node.clock_ns())))
+            heatmaps.publish(SAFETY, node.clock_ns())
 
         def engage() -> Trigger.Response:
             future = client.call_async(Trigger.Request())

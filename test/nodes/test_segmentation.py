@@ -6,15 +6,17 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from sensor_msgs.msg import CompressedImage, Image
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from peace_ros.core.domain import Heatmap, Prompt
+from peace_ros.core.domain import Camera, Distortion, Heatmap, Prompt
 from peace_ros.core.messages import frame_from_message, heatmap_from_image, stamp_ns_of
 from peace_ros.nodes import qos
-from peace_ros.nodes.messages import WARN, prompt_to_message
+from peace_ros.nodes.messages import WARN, camera_info, prompt_to_message
 from peace_ros.nodes.segmentation import SegmentationNode
 
 
@@ -183,3 +185,73 @@ def test_a_covered_lens_gives_no_heatmap_and_says_why(bench, picture):
     bench.until(lambda: bool(diagnostics), lambda: images.publish(covered))
     assert 'one colour' in diagnostics[0].status[0].message
     assert not painter.seen
+
+
+BENT = replace(
+    Camera.from_degrees(64, 48, 90.0),
+    distortion=Distortion('plumb_bob', (-0.1, 0.0, 0.0, 0.0, 0.0)),
+)
+
+
+def test_a_heatmap_comes_with_the_camera_and_the_frame_id_of_its_frame(bench, picture):
+    heatmaps = bench.heard(Image, 'heatmap', qos.IMAGE_IN)
+    frame_infos = bench.heard(CameraInfo, 'heatmap/frame_info', qos.RESULT)
+    overlays = bench.heard(CompressedImage, 'overlay/compressed', qos.IMAGE_IN)
+    bench.run(SegmentationNode, Painter(), template='DD')
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    stamps = iter(range(1, 1000))
+
+    def publish():
+        message = picture(next(stamps))
+        message.header.frame_id = 'belly_optical'
+        images.publish(message)
+
+    bench.until(lambda: heatmaps and frame_infos and overlays, publish)
+    assert frame_infos[0].header == heatmaps[0].header
+    assert {each.header.frame_id for each in (*heatmaps, *overlays)} == {'belly_optical'}
+    size_px = frame_infos[0].width, frame_infos[0].height
+    assert frame_infos[0].k[0] == 0.0, 'nothing is known of the lens'
+    infos = bench.offer(CameraInfo, 'camera_info', qos.RESULT)
+    infos.publish(camera_info(size_px, BENT, 1, 'belly_optical'))
+    bench.until(lambda: frame_infos[-1].k[0] > 0.0, publish)
+    told = heatmap_from_image(heatmaps[-1], frame_infos[-1])
+    assert told.frame_size_px == size_px
+    assert told.camera == BENT
+
+
+def test_images_of_another_size_than_their_camera_info_give_no_heatmap(bench, picture):
+    heatmaps = bench.heard(Image, 'heatmap', qos.IMAGE_IN)
+    diagnostics = bench.heard(DiagnosticArray, '/diagnostics', qos.RESULT)
+    bench.run(SegmentationNode, Painter(), template='DD')
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    infos = bench.offer(CameraInfo, 'camera_info', qos.RESULT)
+    infos.publish(camera_info((640, 480), Camera.from_degrees(640, 480, 90.0), 1, 'optical'))
+    stamps = iter(range(1, 1000))
+
+    def refused():
+        return [each for each in diagnostics if '640 x 480 px, the image has' in str(each.status)]
+
+    bench.until(refused, lambda: images.publish(picture(next(stamps))))
+    heatmaps.clear()
+    for _ in range(3):
+        images.publish(picture(next(stamps)))
+        time.sleep(0.1)
+    assert not heatmaps
+
+
+def test_the_compressed_images_are_beside_the_remapped_image(bench):
+    remap = ['--ros-args', '-r', 'image:=/belly/image_raw']
+    node = SegmentationNode(
+        Painter(),
+        cli_args=remap,
+        parameter_overrides=[
+            Parameter('template', value='DD'),
+            Parameter('image_transport', value='compressed'),
+        ],
+    )
+    try:
+        topics = {each.topic_name for each in node.subscriptions}
+    finally:
+        node.close()
+        node.destroy_node()
+    assert {'/belly/image_raw/compressed', '/belly/camera_info'} <= topics

@@ -11,9 +11,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'peace_ros'
-LINES_OF_WHAT_FLIES = 15_300
-"""Of core and nodes: 14,500, what learns a biased velocity and finds faulty axes, and what names
-the cause that stops the vehicle (fence, second commander, failsafe after a silent line)."""
+LINES_OF_WHAT_FLIES = 16_950
+"""Of core and nodes: 14,500, what learns a biased velocity and finds faulty axes, what names the
+cause that stops the vehicle (fence, second commander, failsafe after a silent line), what compares
+heights, and what knows lens, mount, shape and encodings of the camera."""
 LINES_OF_A_NODE_FILE = 200
 
 

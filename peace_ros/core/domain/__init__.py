@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The nouns of the project, with units, and the conversions between their frames."""
 
+from peace_ros.core.domain.camera import NADIR, Camera, Distortion, Mount
 from peace_ros.core.domain.errors import (
     BundleError,
     ConfigurationError,
@@ -12,19 +13,23 @@ from peace_ros.core.domain.errors import (
     WorldError,
 )
 from peace_ros.core.domain.labels import SAFE_LABELS, Label, is_safe
-from peace_ros.core.domain.motion import Pose, Setpoint, Site, Telemetry
-from peace_ros.core.domain.perception import Camera, DepthImage, Frame, Heatmap, Prompt, RankedWord
+from peace_ros.core.domain.motion import HeightReport, Pose, Setpoint, Site, Telemetry
+from peace_ros.core.domain.perception import DepthImage, Frame, Heatmap, Prompt, RankedWord
 
 __all__ = [
+    'NADIR',
     'SAFE_LABELS',
     'BundleError',
     'Camera',
     'ConfigurationError',
     'DepthImage',
+    'Distortion',
     'Frame',
     'Heatmap',
+    'HeightReport',
     'ImageError',
     'Label',
+    'Mount',
     'PeaceError',
     'Pose',
     'Prompt',

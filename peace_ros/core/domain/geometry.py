@@ -4,15 +4,16 @@
 
 from __future__ import annotations
 
-from math import acos, atan2, cos, sin
+from dataclasses import replace
+from math import acos, atan2, cos, radians, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
+from peace_ros.core.domain.camera import NADIR, Camera, Mount, Quaternion
 from peace_ros.core.domain.motion import Pose
-from peace_ros.core.domain.perception import Camera
 
-Quaternion = tuple[float, float, float, float]
+GRAVITY_M_S2 = 9.80665
 
 _SQRT_HALF = 0.5**0.5
 _NED_TO_ENU: Quaternion = (0.0, _SQRT_HALF, _SQRT_HALF, 0.0)
@@ -31,7 +32,8 @@ def enu_to_ned(east: float, north: float, up: float) -> tuple[float, float, floa
     return north, east, -up
 
 
-def _multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Return the rotation that first rotates as b does, then as a does."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b
     return (
@@ -48,12 +50,12 @@ def _positive_w(q: Quaternion) -> Quaternion:
 
 def attitude_ned_frd_to_enu_flu(q: Quaternion) -> Quaternion:
     """Turn an attitude of aviation (FRD in NED) into that of REP-103 (FLU in ENU)."""
-    return _positive_w(_multiply(_multiply(_NED_TO_ENU, q), _FRD_TO_FLU))
+    return _positive_w(multiply(multiply(_NED_TO_ENU, q), _FRD_TO_FLU))
 
 
 def attitude_enu_flu_to_ned_frd(q: Quaternion) -> Quaternion:
     """Turn an attitude of REP-103 (FLU in ENU) into that of aviation (FRD in NED)."""
-    return _positive_w(_multiply(_multiply(_NED_TO_ENU, q), _FRD_TO_FLU))
+    return _positive_w(multiply(multiply(_NED_TO_ENU, q), _FRD_TO_FLU))
 
 
 def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
@@ -85,6 +87,17 @@ def rotation_matrix(q: Quaternion) -> NDArray[np.float64]:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def lean_acceleration(q: Quaternion) -> tuple[float, float]:
+    """Return the horizontal acceleration (north, east, m/s^2) that the lean of a multicopter gives.
+
+    Its thrust carries its weight; a lean of more than 84 degrees counts as that.
+    """
+    w, x, y, z = q
+    upright = max(0.1, 1.0 - 2.0 * (x * x + y * y))
+    scale = -2.0 * GRAVITY_M_S2 / upright
+    return scale * (x * z + w * y), scale * (y * z - w * x)
 
 
 def angle_between(a: Quaternion, b: Quaternion) -> float:
@@ -127,30 +140,84 @@ def interpolate(before: Pose, after: Pose, stamp_ns: int) -> Pose:
     )
 
 
-def ground_to_image(camera: Camera, pose: Pose) -> NDArray[np.float64]:
-    """Return the 3 x 3 homography from level ground (north m, east m, 1) to pixels (u, v, 1).
+def camera_pose(mount: Mount, pose: Pose) -> Pose:
+    """Return where a mounted camera is and how it is turned, for the pose of the vehicle.
 
-    The ground is the plane ``altitude_agl_m`` below the vehicle. A ground point is in front of
-    the camera when the third homogeneous coordinate is positive.
+    The attitude is that of a vehicle below which a nadir camera would look the same way, so that
+    everything that knows nadir cameras knows this one. What is not known (NaN) stays so.
+    """
+    if mount == NADIR:
+        return pose
+    north, east, down = rotation_matrix(pose.quaternion_ned_frd) @ np.array(mount.offset_frd_m)
+    return replace(
+        pose,
+        north_m=pose.north_m + float(north),
+        east_m=pose.east_m + float(east),
+        down_m=pose.down_m + float(down),
+        quaternion_ned_frd=multiply(pose.quaternion_ned_frd, mount.quaternion),
+        altitude_agl_m=pose.altitude_agl_m - float(down),
+    )
+
+
+def ground_to_camera(camera: Camera, pose: Pose) -> NDArray[np.float64]:
+    """Return the 3 x 3 matrix from level ground (north m, east m, 1) to the axes of the picture.
+
+    The result is in metres to its right, down in it, and along the view: the ground point is in
+    front of the camera when the last one is positive.
+
+    Args:
+        camera: its rectification counts, its lens does not.
+        pose: of a nadir camera; see :func:`camera_pose` for others. The ground is the plane
+            ``altitude_agl_m`` below it.
     """
     body_from_ned = rotation_matrix(pose.quaternion_ned_frd).T
-    # Ground point relative to the camera in NED: (n - north, e - east, altitude).
     ned_from_ground = np.array(
         [[1.0, 0.0, -pose.north_m], [0.0, 1.0, -pose.east_m], [0.0, 0.0, pose.altitude_agl_m]]
     )
-    f = camera.focal_px
-    cu, cv = camera.centre_px
-    # u grows to the right wing, v grows to the tail, depth along body-down.
-    pixel_from_body = np.array([[0.0, f, cu], [-f, 0.0, cv], [0.0, 0.0, 1.0]])
-    return np.asarray(pixel_from_body @ body_from_ned @ ned_from_ground, dtype=np.float64)
+    rectification = np.reshape(camera.rectification, (3, 3))
+    return np.asarray(rectification @ _OPTICAL_FROM_BODY @ body_from_ned @ ned_from_ground)
 
 
-def image_to_ground(camera: Camera, pose: Pose) -> NDArray[np.float64]:
-    """Return the inverse of :func:`ground_to_image`; meaningless above the horizon."""
-    return np.asarray(np.linalg.inv(ground_to_image(camera, pose)), dtype=np.float64)
+_OPTICAL_FROM_BODY = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""Nadir: the right of the picture is the right wing, down in it is the tail, the view is down."""
+
+
+def ground_to_image(camera: Camera, pose: Pose) -> NDArray[np.float64]:
+    """Return the 3 x 3 homography from level ground (north m, east m, 1) to pixels (u, v, 1).
+
+    It is that of the lens without its distortion; see :func:`ground_to_camera` otherwise.
+    """
+    return np.asarray(camera.matrix @ ground_to_camera(camera, pose), dtype=np.float64)
+
+
+def mount_from_degrees(
+    roll_pitch_yaw_deg: tuple[float, float, float], offset_frd_m: tuple[float, float, float]
+) -> Mount:
+    """Return the mount of a nadir camera that is turned by yaw, then pitch, then roll.
+
+    Above 0, pitch lets it look ahead, roll to the left, and yaw turns the top of its picture to
+    the right.
+    """
+    return Mount(quaternion_from_euler(*map(radians, roll_pitch_yaw_deg)), offset_frd_m)
+
+
+def mount_from_optical(rotation_flu: Quaternion, offset_flu_m: tuple[float, float, float]) -> Mount:
+    """Return the mount of a camera whose optical frame (REP-103) lies so in that of the vehicle.
+
+    Args:
+        rotation_flu: of the transform base_link (forward, left, up) to optical frame, as tf has it.
+        offset_flu_m: its translation.
+    """
+    frd_from_optical = multiply(_FRD_TO_FLU, rotation_flu)
+    x, y, z = offset_flu_m
+    return Mount(_positive_w(multiply(frd_from_optical, _BODY_TO_OPTICAL)), (x, -y, -z))
+
+
+_BODY_TO_OPTICAL: Quaternion = (_SQRT_HALF, 0.0, 0.0, -_SQRT_HALF)
+"""A quarter turn about the view: from the right of the picture to the top of it."""
 
 
 def footprint_m(camera: Camera, altitude_agl_m: float) -> tuple[float, float]:
-    """Return (across, along) metres of ground that a level camera sees."""
-    across = camera.width_px / camera.focal_px * altitude_agl_m
-    return across, across * camera.height_px / camera.width_px
+    """Return (across, along) metres of ground that a level camera sees, without distortion."""
+    fx, fy = camera.focal_xy_px
+    return camera.width_px / fx * altitude_agl_m, camera.height_px / fy * altitude_agl_m

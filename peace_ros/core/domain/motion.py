@@ -45,6 +45,21 @@ class Pose:
 
 
 @dataclass(frozen=True)
+class HeightReport:
+    """A height that does not rest on the barometer."""
+
+    source: str
+    """Its name in a sentence."""
+    height_m: float
+    error_m: float
+    """Standard deviation."""
+    above_ground: bool = True
+    """Above the ground below; otherwise only its changes count (GNSS: above the sea)."""
+    is_narrow: bool = False
+    """It measures one spot of the ground, which may be a roof or a tree."""
+
+
+@dataclass(frozen=True)
 class Telemetry:
     """What the autopilot last said; a field it has not said yet is None."""
 
@@ -64,6 +79,8 @@ class Telemetry:
     """The newest STATUSTEXT."""
     battery_remaining: float | None = None
     """Part of the battery that is left, 0 to 1; None where the autopilot does not say."""
+    heights: tuple[HeightReport, ...] = ()
+    """Fresh heights by other sources than that of the pose."""
     position_problem: str = ''
     """Why what it said of its position is not believed; empty while it is, and before it said
     anything."""

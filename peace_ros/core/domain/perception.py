@@ -1,58 +1,16 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the camera and the networks produce: Frame, Camera, Prompt, Heatmap."""
+"""What the camera and the networks produce: Frame, Prompt, Heatmap."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import pi, radians, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
+from peace_ros.core.domain.camera import Camera
 from peace_ros.core.domain.errors import ConfigurationError, ImageError
-
-
-@dataclass(frozen=True)
-class Camera:
-    """Pinhole camera fixed to the vehicle, looking along body-down (nadir).
-
-    The top of the image points to the nose of the vehicle, its right side to the right wing.
-    """
-
-    width_px: int
-    height_px: int
-    fov_x_rad: float
-    """Full horizontal field of view, 0 < fov < pi; pixels are square."""
-
-    def __post_init__(self) -> None:
-        if self.width_px < 1 or self.height_px < 1:
-            raise ConfigurationError(
-                f'camera size {self.width_px} x {self.height_px} px: both must be 1 or more'
-            )
-        if not 0.0 < self.fov_x_rad < pi:
-            raise ConfigurationError(
-                f'camera field of view {self.fov_x_rad:.3f} rad must lie between 0 and pi'
-            )
-
-    @classmethod
-    def from_degrees(cls, width_px: int, height_px: int, fov_x_deg: float) -> Camera:
-        """Build from the full horizontal field of view in degrees (DOVESEI: 73)."""
-        return cls(width_px, height_px, radians(fov_x_deg))
-
-    @property
-    def focal_px(self) -> float:
-        """Focal length in pixels, the same along both axes."""
-        return self.width_px / (2.0 * tan(self.fov_x_rad / 2.0))
-
-    @property
-    def centre_px(self) -> tuple[float, float]:
-        """Principal point (u, v), pixel centres at whole numbers."""
-        return (self.width_px - 1) / 2.0, (self.height_px - 1) / 2.0
-
-    def resized(self, width_px: int, height_px: int) -> Camera:
-        """Return the camera whose image is this one's, scaled (e.g. to a heatmap)."""
-        return Camera(width_px, height_px, self.fov_x_rad)
 
 
 @dataclass(frozen=True)
@@ -63,6 +21,8 @@ class Frame:
     """Height x width x 3, RGB."""
     stamp_ns: int
     """When the camera took it, node clock; it survives to the set-point."""
+    camera: Camera | None = None
+    """What took it, of the size of the image; None where no calibration came with it."""
 
     def __post_init__(self) -> None:
         image = self.image_rgb
@@ -71,6 +31,11 @@ class Frame:
                 f'image of shape {image.shape}, {image.dtype}: give a non-empty '
                 'height x width x 3 uint8 RGB array'
             )
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the image."""
+        return self.image_rgb.shape[1], self.image_rgb.shape[0]
 
 
 @dataclass(frozen=True)
@@ -112,6 +77,10 @@ class Heatmap:
     """Height x width at network resolution, 0 (unsafe) to 1 (surely safe); covers the frame."""
     stamp_ns: int
     """Stamp of the frame."""
+    frame_size_px: tuple[int, int] | None = None
+    """Width and height of the frame; None where it is not known."""
+    camera: Camera | None = None
+    """What took the frame, of the size of the frame; None where it is not calibrated."""
 
     def __post_init__(self) -> None:
         _check_map('heatmap', self.safety)

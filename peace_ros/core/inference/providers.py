@@ -125,8 +125,13 @@ def with_options(providers: Sequence[str], checksum: str) -> list[Any]:
     return [(name, _tensorrt_options(checksum)) if name == TENSORRT else name for name in providers]
 
 
+def engine_folder(checksum: str) -> Path:
+    """Return where TensorRT keeps the engines of a file; they fit one version and one device."""
+    return _CACHE.expanduser() / f'{checksum[:16]}-{_tensorrt_version()}-{_device()}'
+
+
 def _tensorrt_options(checksum: str) -> dict[str, str]:
-    folder = _CACHE.expanduser() / f'{checksum[:16]}-{_tensorrt_version()}-{_device()}'
+    folder = engine_folder(checksum)
     folder.mkdir(parents=True, exist_ok=True)
     return {
         'trt_engine_cache_enable': 'True',

@@ -19,7 +19,13 @@ from peace_ros.core.domain import BundleError, ConfigurationError
 from peace_ros.core.inference.bundle import Bundle
 from peace_ros.core.inference.contract import Graph, Tensor, check_graphs
 from peace_ros.core.inference.openvino_engine import OpenVinoEngine
-from peace_ros.core.inference.providers import CPU, OPENVINO, check_providers, with_options
+from peace_ros.core.inference.providers import (
+    CPU,
+    OPENVINO,
+    TENSORRT,
+    check_providers,
+    with_options,
+)
 
 DEFAULT_PROVIDERS = (CPU,)
 OPTIMISATIONS = MappingProxyType(
@@ -124,13 +130,24 @@ def open_sessions(
         role: Session(
             bundle.paths[role],
             threads=threads,
-            providers=providers,
+            providers=providers_of_role(bundle.manifest.family, role, providers),
             checksum=bundle.manifest.files[bundle.manifest.roles[role]].sha256,
         )
         for role in roles
     }
     check_graphs(bundle.manifest, {role: each.graph for role, each in sessions.items()})
     return MappingProxyType(sessions)
+
+
+def providers_of_role(family: str, role: str, providers: Sequence[str]) -> tuple[str, ...]:
+    """Return those of the providers that a network is opened with.
+
+    TensorRT would build another engine, for minutes and in flight, whenever the number of texts or
+    segments is new.
+    """
+    if role == 'text_encoder' or (family, role) == ('fastsam', 'image_encoder'):
+        return tuple(each for each in providers if each != TENSORRT) or (CPU,)
+    return tuple(providers)
 
 
 class _OnnxRuntimeEngine:

@@ -9,16 +9,31 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, Pose, Telemetry
+from peace_ros.core.domain import (
+    NADIR,
+    Camera,
+    DepthImage,
+    Frame,
+    Heatmap,
+    HeightReport,
+    Mount,
+    Pose,
+    Telemetry,
+)
 from peace_ros.core.landing.decision import Decision
+from peace_ros.core.landing.guidance import over_site
+from peace_ros.core.landing.heights import HeightWatch
 from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.intake import HeatmapIntake
 from peace_ros.core.landing.lookout import Lookout
 from peace_ros.core.landing.parameters import LandingParameters
+from peace_ros.core.landing.situation import Sighting
 from peace_ros.core.landing.states import State
 from peace_ros.core.landing.watch import valid_pose
 from peace_ros.core.mapping import MapParameters, SafetyMap
 
+_PICTURE_LIMIT_NS = 2_000_000_000
+"""Age at which a picture says nothing of the height."""
 _JUMP_NS = 1_000_000_000
 """A clock that goes back by more than this was restarted."""
 
@@ -34,11 +49,21 @@ class LandingCore:
         parameters: LandingParameters,
         camera: Camera,
         map_parameters: MapParameters | None = None,
+        mount: Mount | None = NADIR,
     ) -> None:
+        """Begin in IDLE.
+
+        Args:
+            parameters: Of the landing.
+            camera: For frames that come without a calibration of their own.
+            map_parameters: Of the map.
+            mount: How the camera sits on the vehicle; None until :meth:`place_camera` says it.
+        """
         self.parameters = parameters
         self.safety_map = SafetyMap(map_parameters)
-        self._intake = HeatmapIntake(parameters, camera, self.safety_map)
+        self._intake = HeatmapIntake(parameters, camera, self.safety_map, mount)
         self._lookout = Lookout(parameters, self.safety_map)
+        self._heights = HeightWatch(parameters)
         self._helm = Helm(parameters)
         self._last_ns: int | None = None
         self._drops = 0
@@ -48,6 +73,15 @@ class LandingCore:
         """The state that the last step ended in."""
         return self._helm.state
 
+    @property
+    def last_rejection(self) -> str:
+        """Why the newest heatmap did not reach the map, or why the map was dropped."""
+        return self._intake.last_rejection
+
+    def place_camera(self, mount: Mount) -> None:
+        """Set how the camera sits on the vehicle; no heatmap is used before that is known."""
+        self._intake.place_camera(mount)
+
     def add_pose(self, pose: Pose) -> None:
         """Keep a pose for the heatmaps around its stamp; in the order of stamps."""
         self._intake.add_pose(pose)
@@ -56,17 +90,23 @@ class LandingCore:
         """Put a heatmap into the map with the pose at its stamp, or count the reason why not."""
         self._intake.add_heatmap(heatmap)
 
+    def reject_heatmap(self, reason: str) -> None:
+        """Count a heatmap that cannot be used, and remember why."""
+        self._intake.reject(reason)
+
     def add_depth(self, depth: DepthImage) -> None:
         """Close ground that a depth image shows not flat; optional, and it opens nothing."""
         self._intake.add_depth(depth)
 
     def add_view(self, frame: Frame) -> None:
-        """Keep the picture of a frame, for the position while the autopilot has none."""
+        """Keep the picture of a frame: for the height, and for a position that is missing."""
         self._intake.add_view(frame)
 
     def engage(self) -> None:
         """Begin a landing, also after one that ended in ABORTED, HANDOVER or HOLD."""
         self._lookout.begin()
+        self._heights.begin()
+        self._intake.picture_height.begin()
         self._helm.engage()
 
     def disengage(self) -> None:
@@ -88,8 +128,14 @@ class LandingCore:
             self._lookout.forget_choice()
         pose, before = valid_pose(telemetry, self.parameters), self._helm.state
         sighting = self._lookout.look(now_ns, pose, before, self._helm.without_site_s)
+        heights = self._heights.see(
+            now_ns,
+            pose,
+            self._height_reports(now_ns, telemetry, pose),
+            over_site=self._is_over_site(pose, sighting),
+        )
         decision = self._helm.decide(
-            now_ns, telemetry, telemetry_age_s, sighting, self._intake.last_rejection
+            now_ns, telemetry, telemetry_age_s, sighting, self._intake.last_rejection, heights
         )
         if decision.state is not before and self._lookout.follow(before, decision.state, now_ns):
             self._helm.fail_attempt()
@@ -100,11 +146,30 @@ class LandingCore:
             attempts=self._helm.attempts,
         )
 
+    def _height_reports(
+        self, now_ns: int, telemetry: Telemetry | None, pose: Pose | None
+    ) -> tuple[HeightReport, ...]:
+        """Return the heights to compare with: those of the telemetry, and that of the pictures."""
+        reports = () if telemetry is None else telemetry.heights
+        by_picture = self._intake.picture_height
+        if pose is None or by_picture.stamp_ns is None:
+            return reports
+        if now_ns - by_picture.stamp_ns > _PICTURE_LIMIT_NS:
+            return reports
+        height_m = pose.altitude_agl_m + by_picture.above_reported_m
+        return (*reports, HeightReport('pictures', height_m, 0.0))
+
+    def _is_over_site(self, pose: Pose | None, sighting: Sighting) -> bool:
+        site = sighting.reachable
+        radius_m = self.parameters.safety_radius_m
+        return pose is not None and site is not None and over_site(pose, site, radius_m)
+
     def _keep_time(self, now_ns: int) -> None:
         """Forget everything when the clock jumps back (a restarted simulation)."""
         if self._last_ns is not None and now_ns < self._last_ns - _JUMP_NS:
             self.safety_map.clear()
             self._intake.clear()
             self._lookout.forget_choice()
+            self._heights.begin()
             self._helm.restart_clock(now_ns)
         self._last_ns = now_ns

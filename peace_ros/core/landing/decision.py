@@ -76,6 +76,8 @@ class Decision:
     """Places that are excluded because they failed."""
     attempts: int = 0
     """Descents that failed."""
+    heights_m: Mapping[str, float] = field(default_factory=dict)
+    """Height above ground by each source that the altitude was compared with."""
     relaxed: bool = False
     """The threshold has sunk below safety_threshold, which only relaxation allows."""
 

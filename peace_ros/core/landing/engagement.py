@@ -18,6 +18,7 @@ def engagement_problem(
     telemetry_age_s: float,
     map_age_s: float,
     parameters: LandingParameters,
+    last_rejection: str = '',
 ) -> str:
     """Return a sentence why a landing cannot begin now, empty when it can.
 
@@ -29,7 +30,10 @@ def engagement_problem(
         telemetry_age_s: Since it was received, by a steady clock.
         map_age_s: Since the newest heatmap in the map was taken; infinite without one.
         parameters: Their limits of age and altitude hold here too.
+        last_rejection: Why a heatmap did not reach the map, empty when all did.
     """
     if state not in _MAY_BEGIN:
         return f'a landing is under way already: {state.value}'
-    return bad_vehicle(telemetry, telemetry_age_s, parameters) or bad_map(map_age_s, '', parameters)
+    return bad_vehicle(telemetry, telemetry_age_s, parameters) or bad_map(
+        map_age_s, last_rejection, parameters
+    )

@@ -79,7 +79,8 @@ class Guard:
     def _floor(self, wish: Setpoint, given: Situation) -> tuple[Setpoint, str]:
         if given.pose is None:
             return wish, ''
-        room_m = given.pose.altitude_agl_m - self._p.handover_altitude_m
+        height_m = given.pose.altitude_agl_m - given.above_lowest_m
+        room_m = height_m - self._p.handover_altitude_m
         down = min(wish.v_down_m_s, _slow_enough(room_m, _REACTION_S))
         return replace(wish, v_down_m_s=down), 'descent limited: the floor is near'
 

@@ -80,7 +80,7 @@ def _down(
         tolerance_m: Distance to the middle of the site from which on nothing descends.
         share: Of the usual speed.
     """
-    site, room_m = situation.site, pose.altitude_agl_m - floor_m
+    site, room_m = situation.site, pose.altitude_agl_m - situation.above_lowest_m - floor_m
     if site is None or room_m <= 0.0:
         return 0.0, ''
     if not situation.sighting.ground_is_fresh:

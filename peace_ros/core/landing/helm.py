@@ -17,6 +17,7 @@ from peace_ros.core.landing.decision import Decision
 from peace_ros.core.landing.drift import Drift
 from peace_ros.core.landing.guard import Guard
 from peace_ros.core.landing.guidance import ExpandingSquare, over_site, velocity
+from peace_ros.core.landing.heights import NO_OTHER_HEIGHT, HeightSight
 from peace_ros.core.landing.parameters import LandingParameters
 from peace_ros.core.landing.situation import Sighting, Situation
 from peace_ros.core.landing.states import LOOKING, Events, State, next_state
@@ -104,6 +105,7 @@ class Helm:
         telemetry_age_s: float,
         sighting: Sighting,
         last_rejection: str = '',
+        heights: HeightSight = NO_OTHER_HEIGHT,
     ) -> Decision:
         """Decide what to do now.
 
@@ -113,20 +115,23 @@ class Helm:
             telemetry_age_s: Since it was received, by a steady clock.
             sighting: What the map says.
             last_rejection: Why the newest heatmap was not used, for the sentence.
+            heights: What other sources say of the altitude.
         """
         p = self._p
         if self._since_ns is None:
             self._since_ns = now_ns
         pose = valid_pose(telemetry, p)
         bad_data = bad_telemetry(telemetry, telemetry_age_s, p)
-        bad_data = bad_data or bad_map(sighting.map_age_s, last_rejection, p)
+        bad_data = bad_data or bad_map(sighting.map_age_s, last_rejection, p) or heights.problem
         site = None if bad_data else sighting.reachable
         if self._engaged:
             self._home = self._home or pose
-        situation = Situation(now_ns, pose, telemetry_age_s, sighting, site, self._home)
+        situation = Situation(
+            now_ns, pose, telemetry_age_s, sighting, site, self._home, heights.above_lowest_m
+        )
         if self._engaged:
             self._keep_books(situation, telemetry, bad_data)
-        self._advance(situation, self._events(situation, bad_data))
+        self._advance(situation, self._events(situation, bad_data, heights.may_hand_over))
         situation = replace(situation, search_target=self._search_target(situation))
         wish, note = velocity(self.state, situation, p)
         # What a fence takes from the speed is no drift.
@@ -149,6 +154,7 @@ class Helm:
             outcome=self._outcome,
             time_in_state_s=self._time_in_state_s(now_ns),
             relaxed=relaxed,
+            heights_m=heights.heights_m,
         )
 
     def _lateral_limit_m_s(self, pose: Pose | None) -> float:
@@ -178,9 +184,9 @@ class Helm:
             return True
         return hypot(home.north_m - pose.north_m, home.east_m - pose.east_m) <= _HOME_M
 
-    def _events(self, situation: Situation, bad_data: str) -> Events:
+    def _events(self, situation: Situation, bad_data: str, may_hand_over: bool = True) -> Events:
         p, pose, site = self._p, situation.pose, situation.site
-        altitude_m = inf if pose is None else pose.altitude_agl_m
+        lowest_m = inf if pose is None else pose.altitude_agl_m - situation.above_lowest_m
         seen = situation.sighting.revision - self._revision_at_state
         over, error_m = False, inf
         if pose is not None and site is not None:
@@ -198,8 +204,9 @@ class Helm:
             over_site=over and situation.sighting.ground_is_fresh,
             centred=error_m <= p.handover_error_m,
             at_safe_altitude=at_safe_altitude(pose, p),
-            low_enough_to_land=altitude_m <= p.aiming_floor * p.safe_altitude_m + _AIMED_M,
-            at_handover_altitude=altitude_m <= p.handover_altitude_m + p.handover_tolerance_m,
+            low_enough_to_land=lowest_m <= p.aiming_floor * p.safe_altitude_m + _AIMED_M,
+            at_handover_altitude=lowest_m <= p.handover_altitude_m + p.handover_tolerance_m
+            and may_hand_over,
         )
 
     def _advance(self, situation: Situation, events: Events) -> None:

@@ -12,24 +12,37 @@ from collections import Counter, deque
 
 import numpy as np
 
-from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, ImageError, Pose
+from peace_ros.core.domain import NADIR, Camera, DepthImage, Frame, Heatmap, ImageError, Mount, Pose
+from peace_ros.core.domain.geometry import camera_pose
+from peace_ros.core.landing.calibration import Calibration, has_shape
 from peace_ros.core.landing.odometry import PositionCarrier
 from peace_ros.core.landing.parameters import LandingParameters
+from peace_ros.core.landing.picture_height import PictureHeight
 from peace_ros.core.landing.picture_watch import PictureWatch
 from peace_ros.core.landing.poses import Miss, PoseHistory, jump_m
 from peace_ros.core.mapping import RefusedLookError, SafetyMap
 
 _PENDING_LIMIT = 4
+_NO_MOUNT = 'how the camera is mounted is not known yet'
 
 
 class HeatmapIntake:
-    """Pairs heatmaps with poses by stamp; what cannot be used is counted with its reason."""
+    """Pairs heatmaps with poses by stamp; what cannot be used is counted with its reason.
+
+    Inside, all poses are those of the camera: how it is mounted is applied where they come in.
+    """
 
     def __init__(
-        self, parameters: LandingParameters, camera: Camera, safety_map: SafetyMap
+        self,
+        parameters: LandingParameters,
+        camera: Camera,
+        safety_map: SafetyMap,
+        mount: Mount | None = NADIR,
     ) -> None:
         self._p = parameters
+        self._calibration = Calibration(camera)
         self._camera = camera
+        self._mount = mount
         self._map = safety_map
         self._poses = PoseHistory(parameters.pose_gap_limit_s)
         self._carrier = PositionCarrier(camera, parameters.pose_gap_limit_s, safety_map)
@@ -47,6 +60,11 @@ class HeatmapIntake:
         """How often the map was dropped; a site chosen from it is no longer valid then."""
 
     @property
+    def picture_height(self) -> PictureHeight:
+        """The height by the scale of the pictures."""
+        return self._carrier.height
+
+    @property
     def last_rejection(self) -> str:
         """Why the map is not newer: why it was dropped, or why the last heatmap was rejected."""
         return self._drop_reason or self._last_rejection
@@ -60,8 +78,19 @@ class HeatmapIntake:
         self._newest_depth_ns = -1
         self._clock_ns = None
 
+    def place_camera(self, mount: Mount) -> None:
+        """Set how the camera is mounted; what was seen with another mount is dropped."""
+        if mount != self._mount:
+            self._mount = mount
+            self._poses.clear()
+            self._carrier.clear()
+            self._drop_map('the camera is mounted otherwise')
+
     def add_pose(self, pose: Pose) -> None:
         """Keep a pose, north and east NaN where unknown, and use the heatmaps that wait for it."""
+        if self._mount is None:
+            return
+        pose = camera_pose(self._mount, pose)
         if not pose.has_position:
             kept = self._carrier.add_pose(pose)
         else:
@@ -77,7 +106,9 @@ class HeatmapIntake:
 
     def add_view(self, frame: Frame) -> None:
         """Keep the picture of a frame, from which the position is estimated when it is unknown."""
-        if self._carrier.add_view(frame):
+        if not has_shape(self._camera, *frame.size_px):
+            self.counts['picture of another shape than the frames'] += 1
+        elif self._carrier.add_view(frame):
             self._settle()
 
     def _watch_jump(self, before: Pose, pose: Pose) -> None:
@@ -101,17 +132,19 @@ class HeatmapIntake:
     def add_heatmap(self, heatmap: Heatmap) -> None:
         """Use a heatmap, let it wait for its pose, or reject it."""
         newest_ns = self._pending[-1].stamp_ns if self._pending else self._map.stamp_ns
-        if not np.isfinite(heatmap.safety).all():
-            self._reject('not finite')
+        if self._mount is None:
+            self.reject(_NO_MOUNT)
+        elif not np.isfinite(heatmap.safety).all():
+            self.reject('not finite')
         elif newest_ns is not None and heatmap.stamp_ns <= newest_ns:
-            self._reject('not newer than the last')
+            self.reject('not newer than the last')
         elif self._clock_ns is not None and self._is_future(heatmap, self._clock_ns):
-            self._reject('stamp in the future')
+            self.reject('stamp in the future')
         else:
             self._pending.append(heatmap)
             if len(self._pending) > _PENDING_LIMIT:
                 self._pending.popleft()
-                self._reject('overtaken while it waited for a pose')
+                self.reject('overtaken while it waited for a pose')
             self._settle()
 
     def add_depth(self, depth: DepthImage) -> None:
@@ -129,7 +162,7 @@ class HeatmapIntake:
         limit_ns = round(self._p.pose_wait_limit_s * 1e9)
         while self._pending and self._is_future(self._pending[-1], now_ns):
             self._pending.pop()
-            self._reject('stamp in the future')
+            self.reject('stamp in the future')
         while self._pending:
             stamp_ns = self._pending[0].stamp_ns
             if self._waiting[0] != stamp_ns:
@@ -137,7 +170,7 @@ class HeatmapIntake:
             if now_ns - self._waiting[1] <= limit_ns:
                 break
             self._pending.popleft()
-            self._reject(Miss.NOT_YET.value)
+            self.reject(Miss.NOT_YET.value)
         self._watch_position(now_ns)
 
     def _watch_position(self, now_ns: int) -> None:
@@ -170,7 +203,7 @@ class HeatmapIntake:
                 return
             problem = self._use(self._pending.popleft(), pose)
             if problem:
-                self._reject(problem)
+                self.reject(problem)
             else:
                 self.counts['used'] += 1
                 self._drop_reason = ''
@@ -179,6 +212,13 @@ class HeatmapIntake:
         """Put a heatmap into the map; return why it is rejected, empty when it is used."""
         if isinstance(pose, Miss):
             return pose.value
+        camera = self._calibration.camera_of(heatmap)
+        if isinstance(camera, str):
+            return camera
+        if camera != self._camera:
+            self._camera = camera
+            self._carrier.change_camera(camera)
+            self._drop_map('the camera has another calibration')
         problem = self._pictures.problem(heatmap, pose)
         if problem:
             return problem
@@ -199,6 +239,8 @@ class HeatmapIntake:
             fate = 'depth used'
             if isinstance(pose, Miss):
                 fate = f'depth: {pose.value}'
+            elif not has_shape(self._camera, depth.depth_m.shape[1], depth.depth_m.shape[0]):
+                fate = 'depth of another shape than the frames'
             else:
                 try:
                     self._map.add_depth(depth, self._camera, pose)
@@ -206,6 +248,7 @@ class HeatmapIntake:
                     fate = f'depth {refusal.fate}'
             self.counts[fate] += 1
 
-    def _reject(self, reason: str) -> None:
+    def reject(self, reason: str) -> None:
+        """Count a heatmap that is not used, and remember why."""
         self.counts[reason] += 1
         self._last_rejection = reason

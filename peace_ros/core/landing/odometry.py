@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from peace_ros.core.domain import Camera, Frame, Pose
 from peace_ros.core.domain.geometry import footprint_m
+from peace_ros.core.landing.picture_height import PictureHeight
 from peace_ros.core.landing.poses import Miss, PoseHistory
 from peace_ros.core.mapping import Displacement, Mismatch, SafetyMap, View, register, small_grey
 
@@ -105,6 +106,7 @@ class PositionCarrier:
     def __init__(self, camera: Camera, gap_limit_s: float, safety_map: SafetyMap) -> None:
         self._map = safety_map
         self._odometry = VisualOdometry(camera)
+        self.height = PictureHeight(camera)
         self._attitudes = PoseHistory(gap_limit_s)
         self._carried = PoseHistory(gap_limit_s)
         self._pending: deque[tuple[int, NDArray[np.uint8]]] = deque(maxlen=_PENDING_LIMIT)
@@ -118,6 +120,13 @@ class PositionCarrier:
         """Forget poses and pictures."""
         self._attitudes.clear()
         self._newest_view_ns = -1
+        self.height.begin()
+        self.forget_way()
+
+    def change_camera(self, camera: Camera) -> None:
+        """Use another camera; the estimate begins again."""
+        self._odometry = VisualOdometry(camera)
+        self.height.change_camera(camera)
         self.forget_way()
 
     def forget_way(self) -> None:
@@ -162,11 +171,12 @@ class PositionCarrier:
             self._pending.popleft()
             if isinstance(attitude, Miss):
                 continue
-            position = positions.at(stamp_ns)
+            view, position = View(grey, attitude), positions.at(stamp_ns)
+            self.height.take(view)
             if isinstance(position, Pose):
-                lost = self._come_back(View(grey, attitude), position)
+                lost = self._come_back(view, position)
             else:
-                lost = self._carry_on(View(grey, attitude))
+                lost = self._carry_on(view)
             if lost:
                 self.forget_way()
                 return lost

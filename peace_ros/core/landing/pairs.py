@@ -17,7 +17,7 @@ def decision_pairs(decision: Decision, pose: Pose | None) -> dict[str, str]:
 
     ``north_m``, ``east_m`` and ``altitude_agl_m`` are those of the pose, ``site_...`` and
     ``focus_...`` those of the decision, all in the local NED frame; ``heatmaps/...`` counts the
-    heatmaps by result.
+    heatmaps by result; ``height/..._m`` are heights above ground by other sources.
     """
     numbers = {
         'effective_threshold': decision.effective_threshold,
@@ -34,6 +34,7 @@ def decision_pairs(decision: Decision, pose: Pose | None) -> dict[str, str]:
     ):
         if thing is not None:
             numbers.update({f'{prefix}{field}': getattr(thing, field) for field in fields})
+    numbers.update({f'height/{name}_m': each for name, each in decision.heights_m.items()})
     return {
         'state': decision.state.value,
         'reason': decision.reason,

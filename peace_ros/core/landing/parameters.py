@@ -38,6 +38,13 @@ class LandingParameters(ParameterSet):
     altitude_limit_m: float = parameter(
         500.0, 'Higher altitudes are taken for an error.', low=50.0, high=5000.0
     )
+    height_share: float = parameter(
+        0.12,
+        'HOLD when another source of height (pictures, rangefinder, terrain data, GNSS) differs '
+        'from the altitude by more than this part of it, and three standard errors of the source.',
+        low=0.05,
+        high=1.0,
+    )
     # Sites
     safety_radius_m: float = parameter(
         1.5, 'Radius of the vehicle on the ground.', low=0.2, high=20.0

@@ -49,5 +49,7 @@ class Situation:
     """Where to fly: reachable, and known by data that can be trusted."""
     home: Pose | None = None
     """Where the landing began."""
+    above_lowest_m: float = 0.0
+    """Altitude of the pose minus the lowest height that is believed; the floor counts from it."""
     search_target: tuple[float, float] | None = None
     """Where the search goes next (north, east); None while it stays and looks."""

@@ -18,10 +18,13 @@ from peace_ros.core.domain import Camera, DepthImage, Pose
 from peace_ros.core.domain.geometry import rotation_matrix
 from peace_ros.core.mapping.parameters import MapParameters
 from peace_ros.core.mapping.projection import GroundGrid
+from peace_ros.core.optics import rays
 
 _LARGEST_PX = 160
 """Larger pictures are read at every second, third, ... pixel."""
 _FEWEST_PX = 3
+_BODY_FROM_OPTICAL = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""Of a nadir camera: down in the picture is aft, its right is right, its view is down."""
 _LEAST_KNOWN = 0.5
 """Part of the pixels of a window that must have been measured."""
 
@@ -65,12 +68,12 @@ def _points(
     along = depth.depth_m[np.ix_(rows, columns)].astype(np.float64)
     # A sensor that sees nothing, or no farther, says zero, infinity, or its range.
     known = np.isfinite(along) & (along > 0.0) & (along < range_m)
-    along = np.where(known, along, 0.0)
-    scaled = camera.resized(width, height)
-    cu, cv = scaled.centre_px
-    right = (columns[None, :] - cu) / scaled.focal_px * along
-    forward = -(rows[:, None] - cv) / scaled.focal_px * along
-    body = np.stack((forward, right, along))
+    u, v = np.meshgrid(columns, rows)
+    directions = rays(camera.resized(width, height), u.ravel(), v.ravel())
+    turn = _BODY_FROM_OPTICAL @ np.reshape(camera.rectification, (3, 3)).T
+    body = (turn @ directions).reshape(3, *u.shape)
+    known &= np.isfinite(body[2])
+    body = np.where(known, body * along, 0.0)
     return np.tensordot(rotation_matrix(pose.quaternion_ned_frd), body, axes=1), known
 
 

@@ -21,13 +21,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import Camera, Pose
-from peace_ros.core.domain.geometry import footprint_m, ground_to_image, image_to_ground
+from peace_ros.core.domain.geometry import footprint_m, ground_to_camera
 from peace_ros.core.mapping.projection import tilt_rad
+from peace_ros.core.optics import pixels, sample
 
 PATCH_PX = 128
 """Edge of the patches of ground that are compared."""
 _PATCH_PARTS = (0.9, 0.75, 0.6, 0.45)
 """Edges of patches to try, in footprints of the lower camera."""
+_RIM = np.array(
+    [[0.0, 0.5, 1.0, 1.0, 1.0, 0.5, 0.0, 0.0], [0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 0.5]]
+)
+_RIM = np.vstack((_RIM * (PATCH_PX - 1.0), np.ones(8)))
+"""Corners and middles of the sides of a patch: column, row, 1."""
 _LARGEST_ALTITUDE_RATIO = 1.6
 _LARGEST_TILT_RAD = radians(45.0)
 _LARGEST_SHIFT = 0.35
@@ -135,7 +141,7 @@ def _seen_by(view: View, camera: Camera) -> tuple[Camera, Pose]:
 def _middle(view: View, camera: Camera) -> NDArray[np.float64] | None:
     """Return (north, east) metres of the ground in the middle of the picture, None above it."""
     small, pose = _seen_by(view, camera)
-    middle = image_to_ground(small, pose) @ np.array([*small.centre_px, 1.0])
+    middle = np.linalg.inv(ground_to_camera(small, pose)) @ np.array([0.0, 0.0, 1.0])
     if not middle[2] > 0.0:
         return None
     ground: NDArray[np.float64] = middle[:2] / middle[2]
@@ -160,17 +166,19 @@ def _patch(
             [0.0, 0.0, 1.0],
         ]
     )
-    matrix = ground_to_image(small, pose) @ ground_from_patch
-    last = PATCH_PX - 1.0
-    u, v, depth = matrix @ np.array([[0, last, last, 0], [0, 0, last, last], [1, 1, 1, 1]])
-    if not np.all(depth > 0.0):
+    directions = ground_to_camera(small, pose) @ ground_from_patch
+    rim = directions @ _RIM
+    if not np.all(rim[2] > 0.0):
         return None
-    u, v = u / depth, v / depth
-    if min(u.min(), v.min()) < 0.0 or u.max() > small.width_px - 1 or v.max() > small.height_px - 1:
+    u, v = pixels(small, rim)
+    # A comparison with NaN is false, so directions that cannot be seen are refused too.
+    if not (
+        min(u.min(), v.min()) >= 0.0
+        and u.max() <= small.width_px - 1
+        and v.max() <= small.height_px - 1
+    ):
         return None
-    ground = cv2.warpPerspective(
-        view.grey, matrix, (PATCH_PX, PATCH_PX), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    )
+    (ground,), _ = sample([(view.grey, cv2.INTER_LINEAR)], small, directions, (PATCH_PX, PATCH_PX))
     smooth = cv2.GaussianBlur(ground.astype(np.float32), (0, 0), 1.0)
     return cast('NDArray[np.float32]', smooth)
 

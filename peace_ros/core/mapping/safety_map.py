@@ -27,7 +27,6 @@ from peace_ros.core.mapping.parameters import MapParameters
 from peace_ros.core.mapping.projection import (
     GroundGrid,
     Window,
-    heatmap_from_ground,
     project,
     tilt_rad,
     visible_window,
@@ -225,27 +224,28 @@ class SafetyMap:
     def _lay(self, heatmap: Heatmap, camera: Camera, pose: Pose, elapsed_s: float) -> int:
         p = self.parameters
         height, width = heatmap.safety.shape
-        matrix = heatmap_from_ground(camera, pose, width, height)
-        window = visible_window(matrix, pose, (width, height), self._grid, p.off_nadir_limit_deg)
+        camera = camera.resized(width, height)
+        window = visible_window(camera, pose, self._grid, p.off_nadir_limit_deg)
         if window is None:
             return 0
         grid = self._grid.part(window)
-        nadir_pixel_m = pose.altitude_agl_m / camera.focal_px * camera.width_px / width
-        per_cell = grid.cell_m / nadir_pixel_m
+        fx, fy = camera.focal_xy_px
+        pixel_wh_m = pose.altitude_agl_m / fx, pose.altitude_agl_m / fy
+        per_cell = grid.cell_m / pixel_wh_m[0], grid.cell_m / pixel_wh_m[1]
         # Rounding down keeps the error on the side of unsafe.
         quantised = (heatmap.safety * 255.0).astype(np.uint8)
         kinds = _believed(width, height, p.border_fraction)
-        unsafe = blobs(quantised, nadir_pixel_m, per_cell, p)
+        unsafe = blobs(quantised, pixel_wh_m, grid.cell_m, p)
         if unsafe is not None:
             kinds = np.where((unsafe > 0) & (kinds > 0), np.uint8(_CLEARLY_UNSAFE), kinds)
-        sampled, kind = project(worst_part(quantised, per_cell), kinds, matrix, grid)
+        sampled, kind = project(worst_part(quantised, per_cell), kinds, camera, pose, grid)
         north = (np.arange(grid.rows) + 0.5) * grid.cell_m + (grid.south_m - pose.north_m)
         east = (np.arange(grid.columns) + 0.5) * grid.cell_m + (grid.west_m - pose.east_m)
         ground_sq = np.add.outer(north * north, east * east).astype(np.float32)
         # Squared secant of the slant: slant distance over altitude, and the off-nadir limit.
         secant_sq = 1.0 + ground_sq / np.float32(pose.altitude_agl_m**2)
         kind[secant_sq > 1.0 / cos(np.radians(p.off_nadir_limit_deg)) ** 2] = 0
-        pixel_m = np.float32(nadir_pixel_m) * secant_sq
+        pixel_m = np.float32(pose.altitude_agl_m / camera.focal_px) * secant_sq
         apart_s = p.independent_after_s
         weight = 1.0 if elapsed_s >= apart_s else elapsed_s / apart_s
         self._gather(window, sampled, kind, pixel_m, weight)

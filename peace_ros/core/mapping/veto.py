@@ -9,6 +9,7 @@ looks and some time lift it.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import cast
 
 import cv2
@@ -32,28 +33,34 @@ _NEVER_S = np.float32(-1e9)
 
 
 def blobs(
-    safety: NDArray[np.uint8], pixel_m: float, pixels_per_cell: float, parameters: MapParameters
+    safety: NDArray[np.uint8],
+    pixel_wh_m: tuple[float, float],
+    cell_m: float,
+    parameters: MapParameters,
 ) -> NDArray[np.uint8] | None:
     """Return the clearly unsafe blobs of a heatmap, None when there are none.
 
     Blobs are grown by half a cell, so that sampling at the middles of cells misses none.
 
     :param safety: height x width, 0 to 255.
-    :param pixel_m: edge of a pixel on the ground below the camera.
+    :param pixel_wh_m: width and height of a pixel on the ground below the camera.
+    :param cell_m: edge of a cell of the map.
     :return: same shape, 255 inside of blobs, else 0.
     """
-    if pixel_m > parameters.veto_pixel_m:
+    if sqrt(pixel_wh_m[0] * pixel_wh_m[1]) > parameters.veto_pixel_m:
         return None
     unsafe = cv2.inRange(safety, 0, round(parameters.veto_score * 255.0))
-    width = max(_FEWEST_PIXELS, round(parameters.veto_blob_m / pixel_m))
-    kernel = np.ones((width, width), np.uint8)
+    width, height = (
+        max(_FEWEST_PIXELS, round(parameters.veto_blob_m / each)) for each in pixel_wh_m
+    )
+    kernel = np.ones((height, width), np.uint8)
     # Opening; the anchors are opposite corners, or else an even kernel would shift the blobs.
     opened = cv2.erode(unsafe, kernel, anchor=(0, 0))
-    opened = cv2.dilate(opened, kernel, anchor=(width - 1, width - 1))
+    opened = cv2.dilate(opened, kernel, anchor=(width - 1, height - 1))
     if not opened.any():
         return None
-    reach = 2 * round(pixels_per_cell / 2.0) + 1
-    return cast('NDArray[np.uint8]', cv2.dilate(opened, np.ones((reach, reach), np.uint8)))
+    across, down = (2 * round(cell_m / each / 2.0) + 1 for each in pixel_wh_m)
+    return cast('NDArray[np.uint8]', cv2.dilate(opened, np.ones((down, across), np.uint8)))
 
 
 class Veto:

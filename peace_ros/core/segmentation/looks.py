@@ -4,7 +4,8 @@
 
 From 100 m a person is one pixel of a frame that was shrunk to 352 x 352, and three of the camera's.
 So the frame is also cut into parts, which the network sees at the resolution of the camera; the
-whole frame shows what the parts belong to.
+whole frame shows what the parts belong to. A wide frame is cut in halves, because a network that
+was trained on squares sees less in a squeezed picture.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ Array = NDArray[np.float32]
 _OVERLAP = 0.05
 """How far a part reaches beyond what it answers for, in sides of that: things at its edge are seen
 whole."""
+_HALVED, _WIDE = 1.8, 1.25
+"""A frame this much longer than the network's input, and this much longer than wide, is halved."""
 _SHARE_OF_WHOLE = 0.2
 """Weight of the whole frame in the log-odds of the score."""
 _CAUTION = 0.15
@@ -53,10 +56,14 @@ def parts_of(
 
     Args:
         image_wh: width and height of the frame in pixels.
-        input_wh: of the network's input. No part's own ground is smaller, so none is enlarged.
+        input_wh: of the network's input. No part's own ground is smaller, so none is enlarged; only
+            the halves of a wide frame may be, a little.
         max_looks: at most, the one at the whole frame included.
     """
-    columns, rows = (max(1, image_wh[axis] // input_wh[axis]) for axis in (0, 1))
+    across, down = (image_wh[axis] / input_wh[axis] for axis in (0, 1))
+    columns, rows = max(1, int(across)), max(1, int(down))
+    if columns == rows == 1 and max(across, down) >= max(_HALVED, _WIDE * min(across, down)):
+        columns, rows = (2, 1) if across > down else (1, 2)
     while columns * rows > max(1, max_looks - 1):
         # The direction that is seen more sharply can spare it.
         is_wider = image_wh[0] * rows * input_wh[1] > image_wh[1] * columns * input_wh[0]

@@ -11,13 +11,20 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.core.domain.geometry import Quaternion, quaternion_from_euler, yaw_from_quaternion
-from peace_ros.core.domain.motion import Pose, Telemetry
+from peace_ros.core.domain.camera import Quaternion
+from peace_ros.core.domain.geometry import quaternion_from_euler, yaw_from_quaternion
+from peace_ros.core.domain.motion import HeightReport, Pose, Telemetry
 from peace_ros.core.vehicle.boots import BootClock, BootMoment
 from peace_ros.core.vehicle.clock import TimeMap
 from peace_ros.core.vehicle.dialects import Dialect
 from peace_ros.core.vehicle.gnss import GnssWatch
-from peace_ros.core.vehicle.heights import MAX_EXTRAPOLATION_S, Height, HomeHeight, height_of
+from peace_ros.core.vehicle.heights import (
+    MAX_EXTRAPOLATION_S,
+    Height,
+    HomeHeight,
+    OtherHeights,
+    height_of,
+)
 from peace_ros.core.vehicle.parameters import VehicleParameters
 from peace_ros.core.vehicle.stops import MESSAGES, Stops
 from peace_ros.core.vehicle.texts import StatusTexts
@@ -46,6 +53,8 @@ LIMITS: dict[str, tuple[tuple[str, float], ...]] = {
     'HOME_POSITION': (('z', FARTHEST_M), ('altitude', HIGHEST_MM)),
     'GPS_GLOBAL_ORIGIN': (('altitude', HIGHEST_MM),),
     'GLOBAL_POSITION_INT': (('relative_alt', HIGHEST_MM),),
+    'GPS_RAW_INT': (('alt', HIGHEST_MM),),
+    'TERRAIN_REPORT': (('current_height', FARTHEST_M),),
 }
 """Fields that must be numbers, and the largest size of each that a multicopter can reach."""
 
@@ -104,6 +113,7 @@ class Assembler:
         self._heights = Pairwise(self._parameters.jump_limit_m)
         self._range: tuple[int, float] | None = None
         self._ranges = Pairwise(self._parameters.jump_limit_m)
+        self._others = OtherHeights(self._parameters.jump_limit_m)
         self._newest_boot_ms: dict[str, int] = {}
         self._estimator: tuple[int, int, int] | None = None
         """Steady clock, flags, flags of the report before."""
@@ -159,9 +169,9 @@ class Assembler:
         return self._home.home_msl_m
 
     @property
-    def reported_ns(self) -> int:
-        """The autopilot's clock of the newest believed position, 0 before the first."""
-        return 0 if self._position is None else self._position.report.boot_ms * 1_000_000
+    def report(self) -> PoseReport | None:
+        """The newest believed position, None before the first."""
+        return None if self._position is None else self._position.report
 
     def heartbeat_age_s(self, steady_ns: int) -> float:
         """Return the time since the newest HEARTBEAT, infinite before the first."""
@@ -173,9 +183,11 @@ class Assembler:
         """Return why there is no position to fly by, empty when nothing speaks against it."""
         flags = self._estimator_flags(steady_ns)
         if flags is not None and not _has_position(flags):
+            fix = f' ({self._gnss.fix_note})' if self._gnss.fix_note else ''
             return (
                 f'the autopilot has no estimate of its position (filter flags 0x{flags:X}) and '
-                'refuses velocity set-points: it needs GNSS, external navigation or optical flow'
+                f'refuses velocity set-points: it needs GNSS{fix}, external navigation or optical '
+                'flow'
             )
         return self._absurd or self._gnss.problem or self._watch.problem
 
@@ -204,7 +216,11 @@ class Assembler:
             landed=None if state == 0 else state == mavlink.MAV_LANDED_STATE_ON_GROUND,
             status_text=self.texts.newest,
             battery_remaining=self._battery,
+            heights=() if pose is None else self._other_heights(pose, steady_ns),
         )
+
+    def _other_heights(self, pose: Pose, steady_ns: int) -> tuple[HeightReport, ...]:
+        return self._others.fresh(steady_ns, _level_share(pose.quaternion_ned_frd))
 
     def _doubt(self, steady_ns: int) -> str:
         """Return why the reported position is rejected, empty when it is accepted."""
@@ -316,7 +332,7 @@ class Assembler:
         seen_ns, distance_m = self._range
         if steady_ns - seen_ns > RANGE_LIMIT_S * 1e9:
             return above_home
-        return distance_m * max(0.0, 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2))
+        return distance_m * _level_share(q)
 
     def _distance(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
         if m.orientation != mavlink.MAV_SENSOR_ROTATION_PITCH_270:
@@ -325,6 +341,7 @@ class Assembler:
         distance_m = m.current_distance / 100.0
         if self._ranges.believes(distance_m):
             self._range = (steady_ns, distance_m) if in_range else None
+            self._others.take_range(distance_m if in_range else None, steady_ns)
 
     def _take_home(self, m: Any, _stamp_ns: int, _steady_ns: int) -> None:
         if not self._home.take_home(m.altitude / 1e3, m.z, flying=self._is_flying):
@@ -364,6 +381,11 @@ class Assembler:
         flags = self._estimator_flags(steady_ns)
         known = None if flags is None else _has_position(flags)
         self._gnss.take(m.get_type(), m.fix_type, self._boots.newest_ms, known=known)
+        if m.get_type() == 'GPS_RAW_INT':
+            self._others.take_fix(m, steady_ns)
+
+    def _take_terrain(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
+        self._others.take_terrain(m, steady_ns)
 
     def _text(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
         self.texts.take(m, steady_ns)
@@ -377,6 +399,11 @@ class Assembler:
 
 def _size(m: Any) -> float:
     return sqrt(m.q1 * m.q1 + m.q2 * m.q2 + m.q3 * m.q3 + m.q4 * m.q4)
+
+
+def _level_share(q: Quaternion) -> float:
+    """Return the vertical part of a distance along body-down, 0 to 1."""
+    return max(0.0, 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2))
 
 
 def _has_position(flags: int) -> bool:
@@ -409,6 +436,7 @@ _HANDLERS = {
     'SYS_STATUS': Assembler._health,  # noqa: SLF001
     'GPS_RAW_INT': Assembler._take_fix,  # noqa: SLF001
     'GPS2_RAW': Assembler._take_fix,  # noqa: SLF001
+    'TERRAIN_REPORT': Assembler._take_terrain,  # noqa: SLF001
     'EKF_STATUS_REPORT': Assembler._estimate,  # noqa: SLF001
     'ESTIMATOR_STATUS': Assembler._estimate,  # noqa: SLF001
     'STATUSTEXT': Assembler._text,  # noqa: SLF001

@@ -27,6 +27,8 @@ class GnssWatch:
         self._lost_ms: int | None = None
         self.problem = ''
         """Why the position is not used, empty when nothing speaks against it."""
+        self.fix_note = ''
+        """That there is no 3D fix, empty while there is one or nothing is known."""
 
     def take(self, receiver: str, fix_type: int, boot_ms: int, *, known: bool | None) -> None:
         """Take what a receiver says.
@@ -39,17 +41,19 @@ class GnssWatch:
         """
         has_fix = fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX
         self._fixes[receiver] = (self._fixes.get(receiver, (has_fix, has_fix))[1], has_fix)
+        any_fix = any(newest for _, newest in self._fixes.values())
         # A fix has come back when two messages in a row say so.
         if any(all(fix) for fix in self._fixes.values()):
             self._relied, self._lost_ms = True, None
-        elif self._lost_ms is None and not any(fix[1] for fix in self._fixes.values()):
+        elif self._lost_ms is None and not any_fix:
             self._lost_ms = boot_ms
+        self.fix_note = '' if any_fix else f'fix type {fix_type}, 3 is needed'
         lost = self._relied and self._lost_ms is not None
         outlived = lost and boot_ms - (self._lost_ms or 0) >= BRIDGED_MS
         self._carried = known is not False and (self._carried or (outlived and known is True))
         self.problem = ''
         if lost and not self._carried:
             self.problem = (
-                f'GNSS has lost its fix (fix type {fix_type}, 3 is needed): the position is dead '
+                f'GNSS has lost its fix ({self.fix_note}): the position is dead '
                 'reckoning, until the fix is back or another source carries the position'
             )

@@ -1,16 +1,29 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where home lies below the local frame, and how high the vehicle is without a position; pure."""
+"""Where home lies below the local frame, and every height that the autopilot reports; pure."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from peace_ros.core.domain.motion import HeightReport
+from peace_ros.core.vehicle.trust import Pairwise
 
 HOME_STEP_M = 1.0
 """A home whose height changes by more than this in flight says nothing about the ground below."""
 MAX_EXTRAPOLATION_S = 0.3
+FRESH_NS = 2_000_000_000
+"""A height that is not renewed for so long is no longer compared."""
+LEAST_GNSS_ERROR_M, GNSS_ERROR_M = 1.0, 3.0
+"""Standard deviation of GNSS altitude: at least, and where the receiver does not report it."""
+TERRAIN_ERROR_M = 5.0
+"""Of terrain data, as of SRTM."""
+RANGE_ERROR_M = 0.3
 
 
 class HomeHeight:
@@ -84,3 +97,53 @@ def height_of(message: Any, steady_ns: int) -> Height | None:
     above_m = message.altitude_relative
     boot_ms = message.time_usec // 1000
     return Height(steady_ns, boot_ms, above_m, 0.0) if isfinite(above_m) else None
+
+
+class OtherHeights:
+    """Heights that do not rest on the barometer: GNSS (GPS_RAW_INT), terrain data, rangefinder.
+
+    Args:
+        limit_m: One that is farther from the message before it needs a second message.
+    """
+
+    def __init__(self, limit_m: float) -> None:
+        self._pairs: defaultdict[str, Pairwise] = defaultdict(lambda: Pairwise(limit_m))
+        self._newest: dict[str, tuple[int, HeightReport]] = {}
+
+    def fresh(self, steady_ns: int, level_share: float) -> tuple[HeightReport, ...]:
+        """Return what was reported lately.
+
+        Args:
+            steady_ns: Steady clock.
+            level_share: Vertical part of a distance along body-down, 0 to 1.
+        """
+        fresh = (each for at_ns, each in self._newest.values() if steady_ns - at_ns <= FRESH_NS)
+        return tuple(
+            replace(each, height_m=each.height_m * level_share) if each.is_narrow else each
+            for each in fresh
+        )
+
+    def take_fix(self, m: Any, steady_ns: int) -> None:
+        """Take GPS_RAW_INT: only changes count of an altitude above the sea."""
+        if m.fix_type < mavlink.GPS_FIX_TYPE_3D_FIX:
+            self._newest.pop('GNSS', None)
+            return
+        error_m = max(LEAST_GNSS_ERROR_M, m.v_acc / 1e3) if m.v_acc else GNSS_ERROR_M
+        self._keep(steady_ns, HeightReport('GNSS', m.alt / 1e3, error_m, above_ground=False))
+
+    def take_terrain(self, m: Any, steady_ns: int) -> None:
+        """Take TERRAIN_REPORT, whose spacing is 0 where there are no data."""
+        if m.spacing > 0:
+            self._keep(steady_ns, HeightReport('terrain data', m.current_height, TERRAIN_ERROR_M))
+
+    def take_range(self, distance_m: float | None, steady_ns: int) -> None:
+        """Take the distance along body-down, None when out of range."""
+        if distance_m is None:
+            self._newest.pop('rangefinder', None)
+            return
+        report = HeightReport('rangefinder', distance_m, RANGE_ERROR_M, is_narrow=True)
+        self._keep(steady_ns, report)
+
+    def _keep(self, steady_ns: int, report: HeightReport) -> None:
+        if self._pairs[report.source].believes(report.height_m):
+            self._newest[report.source] = (steady_ns, report)

@@ -14,6 +14,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain.errors import VehicleError
+from peace_ros.core.domain.geometry import lean_acceleration
 from peace_ros.core.domain.motion import Pose, Setpoint, Telemetry
 from peace_ros.core.threads import GuardedThread, OnDefect, print_defect
 from peace_ros.core.vehicle.assembler import Assembler
@@ -22,7 +23,7 @@ from peace_ros.core.vehicle.control import Control
 from peace_ros.core.vehicle.dialects import Dialect, choose_dialect, level_message
 from peace_ros.core.vehicle.housekeeping import Housekeeping
 from peace_ros.core.vehicle.lasting import LastingTransport
-from peace_ros.core.vehicle.obedience import ObedienceWatch
+from peace_ros.core.vehicle.obedience import ObedienceWatch, ReportedMotion
 from peace_ros.core.vehicle.parameters import VehicleParameters
 from peace_ros.core.vehicle.peer import Peer
 from peace_ros.core.vehicle.requests import Requests
@@ -194,9 +195,10 @@ class MavlinkLink:
                 f'velocity set-point {v} m/s: all components must be finite; nothing was sent'
             )
         self._zero_until_ns = 0
+        now_ns = time.monotonic_ns()
         with self._changed:
-            self._obedience.tell(v)
-            self._heard().stops.tell(v, time.monotonic_ns())
+            self._obedience.tell(v, now_ns)
+            self._heard().stops.tell(v, now_ns)
         self._send_setpoint(setpoint)
 
     def send_landing_target(self, site_ned_m: tuple[float, float, float], pose: Pose) -> None:
@@ -380,10 +382,16 @@ class MavlinkLink:
             stopped = told.other_commander or heard.stops.limits_speed(now_ns)
             if not told.in_control or (stopped and not self._obedience.problem):
                 self._obedience.forget()
-            at = told.pose
-            position_m = None if at is None else (at.north_m, at.east_m, -at.altitude_agl_m)
+            at, report, motion = told.pose, heard.report, None
+            if at is not None and report is not None:
+                motion = ReportedMotion(
+                    (*report.position_m[:2], -at.altitude_agl_m),
+                    report.velocity_m_s[:2],
+                    lean_acceleration(at.quaternion_ned_frd),
+                )
             reported_ns = heard.arrived_ns.get(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 0)
-            self._obedience.take(position_m, reported_ns, heard.reported_ns)
+            boot_ns = 0 if report is None else report.boot_ms * 1_000_000
+            self._obedience.take(motion, reported_ns, boot_ns)
 
     def _disobedience(self, now_ns: int) -> str:
         """Return that the vehicle does not follow, with what may explain it; empty when it does."""

@@ -10,11 +10,12 @@ flies away from where they want to be, the faster the farther they are.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from math import dist, inf
 
-from peace_ros.core.vehicle.faulty_axes import AxesWatch
+from peace_ros.core.vehicle.faulty_axes import AxesWatch, Plane
 
 Vector = tuple[float, float, float]
 """North, east, down."""
@@ -37,8 +38,20 @@ FROZEN_M = 0.01
 GAP_S = 0.5
 STEP_M = 3.0
 """No vehicle flies this far between two reports."""
+_TOLD = 63
+"""So many set-points are remembered: more than come in GAP_S."""
 _MEMORY_S = SPANS_S[-1] + LAG_S + CALM_S + GAP_S
 _REMEDY = 'is not believed; take over, engage again when it is right'
+
+
+@dataclass(frozen=True)
+class ReportedMotion:
+    """What the autopilot reports of one moment."""
+
+    position_m: Vector
+    velocity_m_s: Plane
+    lean_m_s2: Plane = (0.0, 0.0)
+    """Horizontal acceleration by the lean of the thrust."""
 
 
 @dataclass(frozen=True)
@@ -55,31 +68,30 @@ class ObedienceWatch:
     """Compares what was told with what is reported; doubt stays until :meth:`forget`."""
 
     def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget all reports, all that was told, and the doubt."""
         self.problem = ''
         """Why the position is not believed, empty when it is."""
         self._marks: deque[_Mark] = deque()
         self._axes = AxesWatch()
-        self._told_m, self._least_down_m_s = 0.0, inf
-        self._velocity_m_s: Vector = (0.0, 0.0, 0.0)
+        self._told_m = 0.0
+        # Not changed in place: another thread may tell while this one takes.
+        self._told: tuple[tuple[float, Vector], ...] = ((-inf, (0.0, 0.0, 0.0)),)
 
-    def forget(self) -> None:
-        """Forget all reports and the doubt."""
-        self.problem = ''
-        self._marks.clear()
-        self._axes = AxesWatch()
-        self._told_m, self._least_down_m_s = 0.0, inf
-        self._velocity_m_s = (0.0, 0.0, 0.0)
-
-    def tell(self, velocity_m_s: Vector) -> None:
+    def tell(self, velocity_m_s: Vector, steady_ns: int) -> None:
         """Note what the vehicle is told from now on."""
-        self._velocity_m_s = velocity_m_s
-        self._least_down_m_s = min(self._least_down_m_s, velocity_m_s[2])
+        if velocity_m_s != self._told[-1][1]:
+            self._told = (*self._told[-_TOLD:], (steady_ns / 1e9, velocity_m_s))
 
-    def take(self, position_m: Vector | None, steady_ns: int, boot_ns: int | None = None) -> None:
-        """Look at a position; the same report twice is looked at once.
+    def take(
+        self, motion: ReportedMotion | None, steady_ns: int, boot_ns: int | None = None
+    ) -> None:
+        """Look at a report; the same report twice is looked at once.
 
         Args:
-            position_m: None is unknown, and proves nothing.
+            motion: None is unknown, and proves nothing.
             steady_ns: When it was reported.
             boot_ns: The same by the autopilot's clock, None: it runs as ours. In a simulation it
                 may run slower, and a slow descent is no lie then, or faster, and the vehicle goes
@@ -88,31 +100,43 @@ class ObedienceWatch:
         at_s = steady_ns / 1e9
         boot_s = at_s if boot_ns is None else boot_ns / 1e9
         last = self._marks[-1] if self._marks else None
-        if last is not None and position_m is not None and at_s == last.at_s:
+        if last is not None and motion is not None and at_s == last.at_s:
             return
         # Jumps are handled by JumpWatch.
-        if position_m is None or (
+        if motion is None or (
             last is not None
-            and not (0.0 <= at_s - last.at_s <= GAP_S and dist(position_m, last.seen_m) <= STEP_M)
+            and not (
+                0.0 <= at_s - last.at_s <= GAP_S and dist(motion.position_m, last.seen_m) <= STEP_M
+            )
         ):
             self._marks.clear()
             self._axes.restart()
             return
-        flown_s = boot_step_s = 0.0
+        boot_step_s = flown_s = 0.0
         if last is not None:
             boot_step_s = min(GAP_S, max(0.0, boot_s - last.boot_s))
             flown_s = min(at_s - last.at_s, boot_step_s)
-        north, east, down = self._velocity_m_s
-        # Any of those since the last report may have held.
-        self._told_m += min(down, self._least_down_m_s) * flown_s
-        self._least_down_m_s = inf
-        self._marks.append(_Mark(at_s, boot_s, position_m, self._told_m))
+            for told_m_s, share in self._told_between(last.at_s, at_s):
+                self._told_m += told_m_s[2] * flown_s * share
+                self._axes.follow(told_m_s[:2], boot_step_s * share)
+        self._marks.append(_Mark(at_s, boot_s, motion.position_m, self._told_m))
         while at_s - self._marks[0].at_s > _MEMORY_S:
             self._marks.popleft()
         for span_s in SPANS_S:
             self.problem = self.problem or self._sinks(at_s, span_s)
-        found = self._axes.take(position_m[:2], (north, east), boot_step_s)
+        found = self._axes.take(
+            motion.position_m[:2], motion.velocity_m_s, motion.lean_m_s2, boot_step_s
+        )
         self.problem = self.problem or (f'{found}: it {_REMEDY}' if found else '')
+
+    def _told_between(self, begin_s: float, end_s: float) -> Iterator[tuple[Vector, float]]:
+        """Yield what the vehicle was told between two moments, and for which share of the time."""
+        told = self._told
+        ends_s = (*(at_s for at_s, _ in told[1:]), inf)
+        for (since_s, velocity_m_s), until_s in zip(told, ends_s, strict=True):
+            told_s = min(until_s, end_s) - max(since_s, begin_s)
+            if told_s > 0.0:
+                yield velocity_m_s, told_s / (end_s - begin_s)
 
     def _sinks(self, at_s: float, span_s: float) -> str:
         late_begin, late_end = self._before(at_s - span_s - LAG_S), self._before(at_s - LAG_S)

@@ -20,9 +20,12 @@ HEIGHT_HZ = 10.0
 ESTIMATOR_HZ = 4.0
 FIX_HZ = 10.0
 """A descent by GNSS has to stop within 1 s of a lost fix."""
+TERRAIN_HZ = 1.0
 MAYBE = frozenset(
     {
         mavlink.MAVLINK_MSG_ID_GPS2_RAW,
+        mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR,
+        mavlink.MAVLINK_MSG_ID_TERRAIN_REPORT,
         mavlink.MAVLINK_MSG_ID_FENCE_STATUS,
         mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
         mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
@@ -41,7 +44,7 @@ class StreamKeeper:
     """Knows which messages are wanted and when each was last asked for."""
 
     def __init__(self, parameters: VehicleParameters, dialect: Dialect) -> None:
-        self._rates_hz: dict[int, float] = {
+        self.rates_hz: dict[int, float] = {
             mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: parameters.pose_rate_hz,
             mavlink.MAVLINK_MSG_ID_ATTITUDE: parameters.pose_rate_hz,
             mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: parameters.state_rate_hz,
@@ -50,14 +53,19 @@ class StreamKeeper:
             dialect.height_message: HEIGHT_HZ,
             mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: FIX_HZ,
             mavlink.MAVLINK_MSG_ID_GPS2_RAW: FIX_HZ,
+            mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: HEIGHT_HZ,
+            mavlink.MAVLINK_MSG_ID_TERRAIN_REPORT: TERRAIN_HZ,
             mavlink.MAVLINK_MSG_ID_FENCE_STATUS: FENCE_HZ,
             mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: TARGET_HZ,
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: HEALTH_HZ,
         }
+        """Message id -> the rate that is asked for."""
         if dialect.heartbeat_rate_hz > 0.0:
-            self._rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
+            self.rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
+        self._optional = {*MAYBE}
         if parameters.altitude_source == 'rangefinder':
-            self._rates_hz[mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR] = parameters.pose_rate_hz
+            self.rates_hz[mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR] = parameters.pose_rate_hz
+            self._optional.remove(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
         self._wanted_once = [mavlink.MAVLINK_MSG_ID_HOME_POSITION]
         if not dialect.home_is_local:
             self._wanted_once.append(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
@@ -70,11 +78,11 @@ class StreamKeeper:
             self._reboots = assembler.reboots
             self.forget()
         requests: list[Request] = []
-        for message_id, rate_hz in self._rates_hz.items():
+        for message_id, rate_hz in self.rates_hz.items():
             limit_ns = max(SILENT_NS, round(3e9 / rate_hz))
             silent = now_ns - assembler.arrived_ns.get(message_id, 0) > limit_ns
             if message_id not in self._asked_ns or silent:
-                again_ns = MAYBE_AGAIN_NS if message_id in MAYBE else ASK_AGAIN_NS
+                again_ns = MAYBE_AGAIN_NS if message_id in self._optional else ASK_AGAIN_NS
                 request = (
                     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
                     (float(message_id), 1e6 / rate_hz),

@@ -25,6 +25,7 @@ import numpy as np
 from peace_ros.core.domain import Pose, Site, Telemetry
 from peace_ros.core.landing.decision import Decision, Verdict
 from peace_ros.core.landing.guidance import over_site
+from peace_ros.core.landing.heights import NO_OTHER_HEIGHT, HeightSight
 from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.parameters import CELL_SCORE_FLOOR, LandingParameters
 from peace_ros.core.landing.situation import Sighting
@@ -62,6 +63,8 @@ class SequenceStep(NamedTuple):
     ground_score: float
     ground_age_s: float
     map_age_s: float
+    heights: HeightSight
+    """What other heights say of the altitude."""
     new_heatmaps: int
     site_fails: bool
     """A change of state counts as the failure of a descent."""
@@ -93,6 +96,12 @@ CHOICES: dict[str, tuple[tuple[Any, float], ...]] = {
     'ground_score': ((0.9, 20), (0.51, 5), (0.49, 1), (0.0, 1), (nan, 0.5)),
     'ground_age_s': ((0.2, 20), (1.49, 5), (1.51, 1), (30.0, 1), (inf, 1), (nan, 0.5)),
     'map_age_s': ((0.2, 30), (1.4, 5), (1.6, 1), (2.1, 1), (60.0, 1), (inf, 1), (nan, 0.5)),
+    'heights': (
+        (NO_OTHER_HEIGHT, 30),
+        (HeightSight(above_lowest_m=2.0), 5),
+        (HeightSight(above_lowest_m=9.0, may_hand_over=False), 3),
+        (HeightSight(problem='the heights disagree', may_hand_over=False), 1),
+    ),
     'new_heatmaps': ((1, 5), (6, 5), (0, 3)),
     'site_fails': ((True, 1), (False, 3)),
     'fence': (('', 10), ('a fence limits the speed', 3)),
@@ -145,7 +154,9 @@ class Trial:
         self._revision += moment.new_heatmaps
         told, before = self._told(moment), self._helm.state
         seen = self._seen(moment, told)
-        decision = self._helm.decide(self._now_ns, told, moment.telemetry_age_s, seen)
+        decision = self._helm.decide(
+            self._now_ns, told, moment.telemetry_age_s, seen, '', moment.heights
+        )
         report.moments += 1
         report.visits[decision.state.value] += 1
         report.descents += decision.setpoint.v_down_m_s > 0.0
@@ -240,7 +251,7 @@ class Trial:
         if not decision.reason:
             yield 'every decision has a reason'
         if state is State.HANDOVER and before is not State.HANDOVER:
-            yield from self._broken_by_handover(pose, seen)
+            yield from self._broken_by_handover(moment, pose, seen)
         yield from self._broken_by_takeover(told, before, state)
         yield from self._broken_by_fence(pose, setpoint.v_north_m_s)
 
@@ -248,8 +259,11 @@ class Trial:
         self, moment: SequenceStep, pose: Pose | None, seen: Sighting
     ) -> Iterator[str]:
         p, site = self._p, seen.verdict.site
-        if pose is None or not pose.altitude_agl_m > p.handover_altitude_m:
-            yield 'never down without a valid altitude above the floor'
+        above_m = moment.heights.above_lowest_m
+        if pose is None or not pose.altitude_agl_m - above_m > p.handover_altitude_m:
+            yield 'never down without a valid altitude above the floor, by the lowest height'
+        if moment.heights.problem:
+            yield 'never down while heights disagree'
         if not moment.map_age_s <= p.descent_heatmap_age_limit_s:
             yield 'never down without a fresh map'
         if not moment.ground_age_s <= p.descent_heatmap_age_limit_s:
@@ -259,8 +273,12 @@ class Trial:
         if site is None or pose is None or not over_site(pose, site, p.safety_radius_m):
             yield 'never down without a SITE under the vehicle'
 
-    def _broken_by_handover(self, pose: Pose | None, seen: Sighting) -> Iterator[str]:
+    def _broken_by_handover(
+        self, moment: SequenceStep, pose: Pose | None, seen: Sighting
+    ) -> Iterator[str]:
         p, site = self._p, seen.verdict.site
+        if moment.heights.problem or not moment.heights.may_hand_over:
+            yield 'never handed over while heights disagree'
         if pose is None or site is None or not over_site(pose, site, p.safety_radius_m):
             yield 'never handed over without a SITE below'
         elif site.distance_m(pose) > p.handover_error_m or not seen.ground_is_fresh:

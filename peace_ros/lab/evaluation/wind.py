@@ -15,7 +15,7 @@ import json
 import sys
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import cos, hypot, inf, pi, sin
 from pathlib import Path
 from time import monotonic
@@ -24,16 +24,33 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import Camera, Heatmap, Pose, Setpoint, Site, Telemetry, VehicleError
-from peace_ros.core.domain.geometry import ground_to_image
+from peace_ros.core.domain import (
+    NADIR,
+    Camera,
+    Heatmap,
+    HeightReport,
+    Label,
+    Mount,
+    Pose,
+    Setpoint,
+    Site,
+    Telemetry,
+    VehicleError,
+)
 from peace_ros.core.landing import Decision, LandingCore, LandingParameters, State
 from peace_ros.core.mapping import MapParameters
-from peace_ros.simulation.autopilot.estimate_errors import PX4_ERRORS, EstimateErrors
+from peace_ros.simulation.autopilot.estimate_errors import (
+    PX4_ERRORS,
+    EstimateErrors,
+    GnssAltitudeError,
+)
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.guided import PositionTarget
 from peace_ros.simulation.autopilot.modes import Mode
 from peace_ros.simulation.autopilot.personality import Kind, Personality
 from peace_ros.simulation.autopilot.physics import Physics
+from peace_ros.simulation.camera import NadirCamera
+from peace_ros.simulation.world import World
 
 ERROR_LIMIT_M = 1.5
 OVERSHOOT_LIMIT_M = 1.0
@@ -56,9 +73,13 @@ _BOOT_S = 60.0
 _VELOCITY_AND_RATE = 0x5C7
 _LOCAL_NED = 1
 _PIXELS = 96
-_CELL_M = 0.5
+_DRAWN_PX = 320
+"""Longer edge of the pictures from which heatmaps are made."""
+_CELL_M = 0.25
 _HALF_M = 100.0
 _SAFE, _UNSAFE = 0.9, 0.1
+_SAFE_SCORE = 0.5
+"""Of the map; above, a cell is more likely safe than not."""
 _NOISE, _NOISE_PX = 0.15, 5.0
 """Standard deviation and width of the errors of the heatmaps."""
 
@@ -101,6 +122,10 @@ class WindFlight:
         seed: Of gusts, direction, place of the island and errors of the heatmaps.
         heatmap_hz: Heatmaps per second.
         px4_errors: Above 0: fly as PX4, with so many times its measured errors.
+        camera: What looks down, with its lens; None: a small square pinhole.
+        mount: How it is mounted.
+        start_m: Height at which the flight begins.
+        gnss_noise_m: Standard deviation of the GNSS altitude.
     """
 
     def __init__(
@@ -110,6 +135,10 @@ class WindFlight:
         seed: int,
         heatmap_hz: float = 5.0,
         px4_errors: float = 0.0,
+        camera: Camera | None = None,
+        mount: Mount = NADIR,
+        start_m: float = START_M,
+        gnss_noise_m: float = 0.0,
     ) -> None:
         self._random = np.random.default_rng(seed)
         self._seed, self._heatmap_s = seed, 1.0 / heatmap_hz
@@ -118,19 +147,37 @@ class WindFlight:
         physics = Physics(wind_to_m_s=wind, gust_m_s=gust_m_s, seed=seed)
         kind = Kind.PX4 if px4_errors > 0.0 else Kind.ARDUPILOT
         errors = EstimateErrors(PX4_ERRORS.times(px4_errors), seed)
-        self._flight = flying(physics, Personality(kind), errors)
-        self._ground = self._painted()
-        self._camera = Camera.from_degrees(_PIXELS, _PIXELS, 73)
-        self._core = LandingCore(LandingParameters(), self._camera, MapParameters(map_size_m=160.0))
+        gnss = GnssAltitudeError(gnss_noise_m, seed)
+        self._flight = flying(physics, Personality(kind), errors, gnss, start_m)
+        square = Camera.from_degrees(_PIXELS, _PIXELS, 73)
+        self._camera = camera
+        self._over_ground = self._seeing(square if camera is None else camera, mount)
+        # What the frames are comes with them; the parameters of the landing describe the square.
+        self._core = LandingCore(
+            LandingParameters(), square, MapParameters(map_size_m=160.0), mount
+        )
         self._core.engage()
         self._poses: deque[tuple[float, Pose, tuple[float, float, float]]] = deque()
         self._heatmaps: deque[tuple[float, Heatmap]] = deque()
         self._telemetry = Telemetry(received_ns=0)
         self._told_s = self._now_s
         self._due_s = dict.fromkeys(('pose', 'heatmap', 'step'), self._now_s)
-        self._lowest_m = START_M
+        self._lowest_m = start_m
         self.track: list[tuple[float, float, float, Decision]] = []
         """Time, true north and east, and the decision of each step."""
+        self.clearances_m = (0.0, 0.0)
+        """At the end of the landing: of the site by the map, and the true one below the vehicle."""
+
+    def map_error_m(self) -> float:
+        """Return how far the middle of the largest safe ground of the map is from the island's."""
+        layers = self._core.safety_map.layers(round(self._now_s * 1e9))
+        safe = (layers.score > _SAFE_SCORE).astype(np.uint8)
+        count, _, sizes, centres = cv2.connectedComponentsWithStats(safe)
+        if count < 2:
+            return inf
+        column, row = centres[1 + int(np.argmax(sizes[1:, cv2.CC_STAT_AREA]))]
+        north, east = layers.centre_of(row, column)
+        return hypot(north - self.island_m[0], east - self.island_m[1])
 
     @property
     def _now_s(self) -> float:
@@ -145,6 +192,9 @@ class WindFlight:
             outcome = self.track[-1][3].outcome if self.track else None
         over_s, at = self._now_s, len(self.track) - 1
         site = self.track[at][3].site
+        physics = self._flight.physics
+        true_m = self._over_ground.clearance_m(physics.north_m, physics.east_m)
+        self.clearances_m = (0.0 if site is None else site.clearance_m, true_m or 0.0)
         while self._now_s < over_s + _AFTER_S:
             self._tick()
         return Landed(
@@ -180,20 +230,30 @@ class WindFlight:
         q = self._flight.physics.quaternion_ned_frd
         return Pose(round(self._now_s * 1e9), north, east, down, q, -down)
 
+    def _seen_from(self) -> Pose:
+        """Return the pose of now with the true height."""
+        return replace(self._pose(), altitude_agl_m=-self._flight.physics.down_m)
+
+    def _heights(self) -> tuple[HeightReport, ...]:
+        """Return what other sources than the barometer report now."""
+        return ()
+
     def _report(self) -> None:
         velocity = self._flight.velocity_m_s
         self._poses.append((self._now_s + _LINE_DELAY_S, self._pose(), velocity))
 
     def _look(self) -> None:
-        pose = self._pose()
-        matrix = ground_to_image(self._camera, pose) @ np.array(
-            [[0.0, _CELL_M, -_HALF_M], [_CELL_M, 0.0, -_HALF_M], [0.0, 0.0, 1.0]]
-        )
+        pose = self._seen_from()
         size = (_PIXELS, _PIXELS)
-        true = cv2.warpPerspective(self._ground, matrix, size, borderValue=_UNSAFE)
+        labels = self._over_ground.view(pose).labels
+        safe = np.where(labels == Label.GRASS, np.float32(_SAFE), np.float32(_UNSAFE))
+        true = cv2.resize(safe, size, interpolation=cv2.INTER_AREA)
         noise = cv2.GaussianBlur(self._random.standard_normal(size), (0, 0), _NOISE_PX)
         safety = np.clip(true + _NOISE * noise / noise.std(), 0.0, 1.0).astype(np.float32)
-        self._heatmaps.append((self._now_s + _LATENCY_S, Heatmap(safety, pose.stamp_ns)))
+        seen_by = self._camera
+        size_px = None if seen_by is None else (seen_by.width_px, seen_by.height_px)
+        heatmap = Heatmap(safety, pose.stamp_ns, size_px, seen_by)
+        self._heatmaps.append((self._now_s + _LATENCY_S, heatmap))
 
     def _receive(self) -> None:
         while self._poses and self._poses[0][0] <= self._now_s:
@@ -201,7 +261,16 @@ class WindFlight:
             self._core.add_pose(pose)
             self._told_s = self._now_s
             self._telemetry = Telemetry(
-                1, pose, *velocity, armed=True, in_control=True, mode='GUIDED', landed=False
+                received_ns=1,
+                pose=pose,
+                v_north_m_s=velocity[0],
+                v_east_m_s=velocity[1],
+                v_down_m_s=velocity[2],
+                armed=True,
+                in_control=True,
+                mode='GUIDED',
+                landed=False,
+                heights=self._heights(),
             )
         while self._heatmaps and self._heatmaps[0][0] <= self._now_s:
             self._core.add_heatmap(self._heatmaps.popleft()[1])
@@ -225,14 +294,19 @@ class WindFlight:
         ]
         return to_and_fro_m(np.array(places).reshape(-1, 2))
 
-    def _painted(self) -> NDArray[np.float32]:
-        """Return the ground: rows to the north, columns to the east."""
+    def _seeing(self, camera: Camera, mount: Mount) -> NadirCamera:
+        """Return the camera over the ground, which is unsafe but for an island."""
         cells = round(2.0 * _HALF_M / _CELL_M)
-        ground = np.full((cells, cells), _UNSAFE, np.float32)
-        north, east = self._random.uniform(-15.0, 15.0, size=2)
-        centre = (round((east + _HALF_M) / _CELL_M), round((north + _HALF_M) / _CELL_M))
-        cv2.circle(ground, centre, round(ISLAND_M / _CELL_M), _SAFE, -1)
-        return ground
+        labels = np.full((cells, cells), Label.BUILDING, np.uint8)
+        north, east = map(float, self._random.uniform(-15.0, 15.0, size=2))
+        centre = (round((_HALF_M + east) / _CELL_M), round((_HALF_M - north) / _CELL_M))
+        cv2.circle(labels, centre, round(ISLAND_M / _CELL_M), int(Label.GRASS), -1)
+        world = World(np.repeat(labels[..., None], 3, axis=2), labels, _CELL_M, 'island')
+        self.island_m = north, east
+        # A smaller picture shows the same directions.
+        scale = max(1.0, max(camera.width_px, camera.height_px) / _DRAWN_PX)
+        size_px = round(camera.width_px / scale), round(camera.height_px / scale)
+        return NadirCamera(world, camera.resized(*size_px), mount)
 
 
 def to_and_fro_m(places_m: NDArray[np.float64]) -> float:
@@ -248,7 +322,11 @@ def to_and_fro_m(places_m: NDArray[np.float64]) -> float:
 
 
 def flying(
-    physics: Physics, personality: Personality | None = None, errors: EstimateErrors | None = None
+    physics: Physics,
+    personality: Personality | None = None,
+    errors: EstimateErrors | None = None,
+    gnss: GnssAltitudeError | None = None,
+    start_m: float = START_M,
 ) -> Flight:
     """Return an autopilot that has hovered in this wind for a while, in GUIDED or OFFBOARD.
 
@@ -256,11 +334,13 @@ def flying(
         physics: Of the vehicle, at rest on the ground.
         personality: Which autopilot; None: ArduPilot.
         errors: Of its estimates; None: none.
+        gnss: Error of the GNSS altitude; None: none.
+        start_m: Height at which it hovers.
 
     Raises:
         VehicleError: it does not come into the air.
     """
-    flight = Flight(physics, personality, errors=errors)
+    flight = Flight(physics, personality, errors=errors, gnss=gnss)
     while not flight.has_position:
         flight.step(_TICK_S)
     flight.set_mode(Mode.STABILIZE if flight.personality.is_px4 else Mode.GUIDED)
@@ -272,7 +352,7 @@ def flying(
             raise VehicleError(f'the simulated vehicle did not take off within {_BOOT_S:g} s')
         flight.step(_TICK_S)
     physics.north_m = physics.east_m = 0.0
-    physics.down_m = -START_M
+    physics.down_m = -start_m
     for mode in (Mode.BRAKE, Mode.GUIDED):
         flight.take_velocity(_target(Setpoint(0)))
         flight.set_mode(mode)

@@ -8,7 +8,7 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from peace_ros.core.domain import Camera, Frame, Pose, Telemetry
+from peace_ros.core.domain import Camera, Frame, Mount, Pose, Telemetry
 from peace_ros.core.landing import Decision
 from peace_ros.core.pipeline import Pipeline, SegmentedFrame, create_landing
 from peace_ros.core.presets import Preset
@@ -42,6 +42,7 @@ class ReplayLine:
         self,
         preset: Preset,
         camera: Camera,
+        mount: Mount,
         poses: list[Pose],
         engage_ns: int | None,
         *,
@@ -51,7 +52,8 @@ class ReplayLine:
 
         Args:
             preset: parameters of the three nodes.
-            camera: that of the recorded frames.
+            camera: that of frames that come without a calibration.
+            mount: how the camera sits on the vehicle.
             poses: in the order of their stamps.
             engage_ns: when the landing begins; None: with the first frame.
             threads: CPU threads of the networks; only 1 gives the same sums on every machine.
@@ -60,7 +62,7 @@ class ReplayLine:
             PeaceError: parameters, terms, vocabularies or bundles cannot be used.
         """
         self.pipeline = Pipeline.from_preset(preset, threads=threads)
-        self.landing = create_landing(preset, camera)
+        self.landing = create_landing(preset, camera, mount)
         self._poses = poses
         self._stamps = [pose.stamp_ns for pose in poses]
         self._fed = 0
@@ -76,6 +78,7 @@ class ReplayLine:
         """
         look = self.pipeline.look(frame)
         self._feed_poses(frame.stamp_ns)
+        self.landing.add_view(frame)
         self.landing.add_heatmap(look.heatmap)
         return look
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from peace_ros.core.domain import Camera, PeaceError, RecordingError
+from peace_ros.core.domain import PeaceError, RecordingError
 from peace_ros.core.pipeline import SegmentedFrame
 from peace_ros.core.presets import DEFAULT_PRESET, load_preset
 from peace_ros.lab.replay.line import ReplayLine, Step
@@ -144,10 +144,11 @@ class Replayer:
         """Load the models when the size of the images is known."""
         if taken.frame is None:
             raise RecordingError(f'frame at {taken.stamp_ns} ns cannot be used: {taken.fault}')
-        height, width = taken.frame.image_rgb.shape[:2]
+        width, height = taken.frame.size_px
         return ReplayLine(
             self._preset,
-            Camera(width, height, self._source.fov_x_rad),
+            self._source.options.assumed_camera(width, height),
+            self._source.mount,
             self._source.poses,
             self._source.engage_ns,
             threads=self._threads,

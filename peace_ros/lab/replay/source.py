@@ -7,27 +7,38 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import isfinite, radians
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Protocol
 
 from typer import Option
 
-from peace_ros.core.domain import Frame, ImageError, Pose, RecordingError, VehicleError
+from peace_ros.core.domain import (
+    NADIR,
+    Camera,
+    Frame,
+    Mount,
+    PeaceError,
+    Pose,
+    RecordingError,
+    VehicleError,
+)
+from peace_ros.core.domain.geometry import mount_from_degrees
 from peace_ros.core.messages import (
     diagnostic_values,
     frame_from_message,
+    is_rectified,
     pose_from_message,
     stamp_ns_of,
 )
+from peace_ros.lab.replay.calibration import DEFAULT_FOV_DEG, RecordedCalibration
 from peace_ros.recording import AltitudeProfile, BagReader, VideoReader
-from peace_ros.recording.messages import IMAGE_TYPES, POSE_TYPES, fov_x_rad_of
+from peace_ros.recording.messages import IMAGE_TYPES, POSE_TYPES
 from peace_ros.recording.storages import STORAGES, is_recording
 from peace_ros.recording.video import VIDEO_SUFFIXES
 
-DEFAULT_FOV_DEG = 73.0
 DEFAULT_ALTITUDE = '100:20'
-_CAMERA_INFO = 'sensor_msgs/msg/CameraInfo'
+_LARGEST_TURN_DEG = 360.0
 _CLOCKS_APART_S = 3600.0
 """A recording may begin long before its first image; clocks that differ, differ by more."""
 _STATUS_TOPIC = '/landing/status'
@@ -54,7 +65,25 @@ class SourceOptions:
         Option(
             '--fov',
             metavar='DEG',
-            help='Full horizontal field of view; default camera_info, else 73.',
+            help='Full horizontal field of view; default: the camera_info beside the image, '
+            'else 73.',
+        ),
+    ] = None
+    mount_roll_deg: Annotated[
+        float | None,
+        Option('--mount-roll', metavar='DEG', help='The camera looks so far to the left.'),
+    ] = None
+    mount_pitch_deg: Annotated[
+        float | None,
+        Option('--mount-pitch', metavar='DEG', help='The camera looks so far ahead.'),
+    ] = None
+    mount_yaw_deg: Annotated[
+        float | None,
+        Option(
+            '--mount-yaw',
+            metavar='DEG',
+            help='The top of the image is so far to the right of the nose; default of all three: '
+            '/tf_static from base_link to the frame_id of the images, else 0.',
         ),
     ] = None
     altitude: Annotated[
@@ -86,6 +115,28 @@ class SourceOptions:
             raise RecordingError(f'--limit {self.limit}: give 1 or more')
         if self.fov_x_deg is not None and not 5.0 <= self.fov_x_deg <= 150.0:
             raise RecordingError(f'--fov {self.fov_x_deg} deg: give 5 to 150')
+        for name, turn_deg in zip(('roll', 'pitch', 'yaw'), self._turns_deg, strict=True):
+            if turn_deg is not None and not abs(turn_deg) <= _LARGEST_TURN_DEG:
+                raise RecordingError(
+                    f'--mount-{name} {turn_deg} deg: give -{_LARGEST_TURN_DEG:g} to '
+                    f'{_LARGEST_TURN_DEG:g}'
+                )
+
+    @property
+    def _turns_deg(self) -> tuple[float | None, float | None, float | None]:
+        return self.mount_roll_deg, self.mount_pitch_deg, self.mount_yaw_deg
+
+    @property
+    def mount(self) -> Mount | None:
+        """How the user says that the camera is mounted, None where nothing was said."""
+        roll, pitch, yaw = self._turns_deg
+        if roll is pitch is yaw is None:
+            return None
+        return mount_from_degrees((roll or 0.0, pitch or 0.0, yaw or 0.0), (0.0, 0.0, 0.0))
+
+    def assumed_camera(self, width_px: int, height_px: int) -> Camera:
+        """Return the camera of frames of a size that come without a calibration."""
+        return Camera.from_degrees(width_px, height_px, self.fov_x_deg or DEFAULT_FOV_DEG)
 
 
 @dataclass(frozen=True)
@@ -103,7 +154,9 @@ class RecordingSource(Protocol):
     path: Path
     count: int
     """About how many frames :meth:`frames` yields."""
-    fov_x_rad: float
+    options: SourceOptions
+    mount: Mount
+    """How the camera sits on the vehicle."""
     poses: list[Pose]
     """In the order of their stamps."""
     engage_ns: int | None
@@ -151,10 +204,10 @@ class VideoSource:
 
     def __init__(self, path: Path, options: SourceOptions) -> None:
         self.path = path
-        self._options = options
+        self.options = options
+        self.mount = options.mount or NADIR
         self._reader = VideoReader(path, AltitudeProfile.parse(options.altitude))
         self.count = _Picker(options).about(self._reader.count)
-        self.fov_x_rad = radians(options.fov_x_deg or DEFAULT_FOV_DEG)
         self.poses = [self._reader.pose(index) for index in range(self._reader.count)]
         self.engage_ns: int | None = None
         self.remarks = [
@@ -164,7 +217,7 @@ class VideoSource:
 
     def frames(self) -> Iterator[Taken]:
         """Yield the chosen frames; raises RecordingError when the file breaks off."""
-        picker = _Picker(self._options)
+        picker = _Picker(self.options)
         for _, frame in self._reader.frames():
             if picker.takes(frame.stamp_ns):
                 yield Taken(frame.stamp_ns, frame)
@@ -173,11 +226,11 @@ class VideoSource:
 
 
 class BagSource:
-    """An image topic and a pose topic of a bag."""
+    """An image topic, its camera_info, and a pose topic of a bag."""
 
     def __init__(self, path: Path, options: SourceOptions) -> None:
         self.path = path
-        self._options = options
+        self.options = options
         with BagReader(path) as bag:
             self.image_topic = _choose(
                 bag, options.image_topic, IMAGE_TYPES, _PREFERRED_IMAGES, '--image-topic'
@@ -196,15 +249,22 @@ class BagSource:
                 for pose in _poses(bag, self.pose_topic, self.remarks)
             ]
             self._unstamped = _unstamped(bag, self.image_topic, self.poses, self.remarks)
-            self.fov_x_rad = _field_of_view(bag, options)
+            self._calibration = RecordedCalibration(
+                bag, self.image_topic, is_wanted=options.fov_x_deg is None, remarks=self.remarks
+            )
+            self.mount = options.mount or self._calibration.mount
             self.engage_ns = _engaged_ns(bag)
 
     def frames(self) -> Iterator[Taken]:
         """Yield the chosen frames; those that cannot be decoded with their fault."""
-        picker = _Picker(self._options)
-        last_ns = -1
+        picker = _Picker(self.options)
+        last_ns, info = -1, self._calibration.first
+        topics = [self.image_topic, *self._calibration.topics]
         with BagReader(self.path) as bag:
-            for _, receipt_ns, message in bag.messages([self.image_topic]):
+            for topic, receipt_ns, message in bag.messages(topics):
+                if topic != self.image_topic:
+                    info = message
+                    continue
                 stamp_ns = receipt_ns if self._unstamped else stamp_ns_of(message)
                 if not picker.takes(stamp_ns):
                     continue
@@ -214,8 +274,10 @@ class BagSource:
                     continue
                 last_ns = stamp_ns
                 try:
-                    yield Taken(stamp_ns, replace(frame_from_message(message), stamp_ns=stamp_ns))
-                except ImageError as error:
+                    rectified = is_rectified(self.image_topic)
+                    frame = frame_from_message(message, info, rectified=rectified)
+                    yield Taken(stamp_ns, replace(frame, stamp_ns=stamp_ns))
+                except PeaceError as error:
                     yield Taken(stamp_ns, None, str(error))
                 if picker.is_done:
                     return
@@ -309,15 +371,6 @@ def _unstamped(bag: BagReader, topic: str, poses: list[Pose], remarks: list[str]
             'clock (synchronise the autopilot, or let the driver stamp in ROS time)'
         )
     return unstamped
-
-
-def _field_of_view(bag: BagReader, options: SourceOptions) -> float:
-    if options.fov_x_deg is not None:
-        return radians(options.fov_x_deg)
-    for topic in bag.find([_CAMERA_INFO]):
-        for _, _, message in bag.messages([topic]):
-            return fov_x_rad_of(message)
-    return radians(DEFAULT_FOV_DEG)
 
 
 def _engaged_ns(bag: BagReader) -> int | None:

@@ -13,7 +13,11 @@ from typing import final
 from peace_ros.core.domain.errors import VehicleError
 from peace_ros.core.domain.motion import Pose
 from peace_ros.simulation.autopilot.disturbance import Disturbance
-from peace_ros.simulation.autopilot.estimate_errors import ErrorSizes, EstimateErrors
+from peace_ros.simulation.autopilot.estimate_errors import (
+    ErrorSizes,
+    EstimateErrors,
+    GnssAltitudeError,
+)
 from peace_ros.simulation.autopilot.fault_port import FaultServer
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.modes import Result
@@ -231,7 +235,8 @@ class AutopilotSim:
             position_noise_m=measured.position_noise_m if noise < 0.0 else noise,
         )
         errors = EstimateErrors(sizes, p.seed)
-        return Flight(physics, self._personality, p.home_altitude_msl_m, errors)
+        gnss = GnssAltitudeError(p.gnss_altitude_noise_m, p.seed)
+        return Flight(physics, self._personality, p.home_altitude_msl_m, errors, gnss)
 
     def _note_altitude(self) -> None:
         altitude_m = -self._flight.physics.down_m

@@ -1,11 +1,11 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the filter of the simulated autopilot is wrong about: velocity and position."""
+"""What the filter of the simulated autopilot is wrong about: velocity, position and height."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, sqrt
+from math import copysign, exp, inf, sqrt
 from random import Random
 
 Plane = tuple[float, float]
@@ -14,6 +14,11 @@ BIAS_TIME_S = 15.0
 """How long the bias of the velocity stays alike."""
 NOISE_TIME_S = 5.0
 """How long the error of the position stays alike."""
+GLIDE_TIME_S = 2.0
+"""How the height follows an error of the barometer: "over seconds" was seen of ArduCopter 4.7-dev
+(a step of 8 m); this time constant was not measured."""
+GNSS_TIME_S = 100.0
+"""How long the error of the GNSS altitude stays alike."""
 
 
 @dataclass(frozen=True)
@@ -66,3 +71,52 @@ class EstimateErrors:
         keep = exp(-share)
         north, east = self._drawn(size * sqrt(1.0 - keep * keep))
         return keep * error[0] + north, keep * error[1] + east
+
+
+class BarometerError:
+    """Error of the barometer: steps and drifts, which the estimated height follows smoothly.
+
+    Args:
+        glide_s: Time constant of the estimate.
+    """
+
+    def __init__(self, glide_s: float = GLIDE_TIME_S) -> None:
+        self._glide_s = glide_s
+        self._goal_m = self._error_m = 0.0
+        self._rate_m_s = inf
+        self.height_m = 0.0
+        """Estimated height minus the true one."""
+        self.climb_m_s = 0.0
+        """How fast that changes."""
+
+    def become(self, error_m: float, rate_m_s: float = inf) -> None:
+        """Let the error of the barometer become so large, at once or at a rate above 0."""
+        self._goal_m, self._rate_m_s = error_m, rate_m_s
+
+    def step(self, dt_s: float) -> None:
+        """Advance the error and the estimate."""
+        left_m = self._goal_m - self._error_m
+        self._error_m += copysign(min(abs(left_m), self._rate_m_s * dt_s), left_m)
+        follow = (1.0 - exp(-dt_s / self._glide_s)) * (self._error_m - self.height_m)
+        self.height_m += follow
+        self.climb_m_s = follow / dt_s
+
+
+class GnssAltitudeError:
+    """Error of the altitude in GPS_RAW_INT; wanders as an Ornstein-Uhlenbeck process.
+
+    Args:
+        size_m: Standard deviation.
+        seed: Of the wandering.
+    """
+
+    def __init__(self, size_m: float, seed: int = 0) -> None:
+        self._random = Random(seed + 2)
+        self.size_m = size_m
+        self.error_m = self._random.gauss(0.0, size_m)
+
+    def step(self, dt_s: float) -> None:
+        """Wander on."""
+        keep = exp(-dt_s / GNSS_TIME_S)
+        spread_m = self.size_m * sqrt(1.0 - keep * keep)
+        self.error_m = keep * self.error_m + self._random.gauss(0.0, spread_m)

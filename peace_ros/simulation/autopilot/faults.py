@@ -19,7 +19,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from inspect import Parameter, signature
-from math import isinf, radians
+from math import inf, isfinite, isinf, radians
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from peace_ros.core.domain.errors import VehicleError
@@ -77,6 +77,7 @@ def clear(sim: AutopilotSim) -> None:
     """Take every distortion away; what has happened (a reboot, a mode change) stays."""
     sim.disturbance.__dict__.update(vars(Disturbance()))
     sim.restore_gps()
+    sim.flight.barometer.become(0.0)
     sim.pilot_yaw_stick(0.0)
     sim.flight.fence = Fence()
     sim.flight.commander = SecondCommander()
@@ -113,6 +114,22 @@ def altitude(sim: AutopilotSim, *, kind: str = 'true', offset_m: float = 0.0) ->
     sim.disturbance.altitude = kind
     sim.disturbance.altitude_offset_m = float(offset_m)
     sim.disturbance.frozen_down_m = sim.flight.position_m[2]
+
+
+@_fault
+def barometer(sim: AutopilotSim, *, error_m: float = 0.0, rate_m_s: float = inf) -> None:
+    """Let the barometer be wrong: the estimated height glides there, and the vehicle with it.
+
+    Args:
+        sim: The simulation.
+        error_m: Reported minus true height; 0 ends it.
+        rate_m_s: A drift at this rate, above 0; infinite: a step.
+    """
+    if not (isfinite(error_m) and rate_m_s > 0.0):
+        raise VehicleError(
+            f'fault barometer: error_m = {error_m} must be finite, rate_m_s = {rate_m_s} above 0'
+        )
+    sim.flight.barometer.become(float(error_m), float(rate_m_s))
 
 
 @_fault

@@ -13,7 +13,11 @@ from dataclasses import replace
 from math import isfinite
 
 from peace_ros.simulation.autopilot.commander import SecondCommander
-from peace_ros.simulation.autopilot.estimate_errors import EstimateErrors
+from peace_ros.simulation.autopilot.estimate_errors import (
+    BarometerError,
+    EstimateErrors,
+    GnssAltitudeError,
+)
 from peace_ros.simulation.autopilot.estimator import RECKONS_PX4_S, RECKONS_S, Estimator
 from peace_ros.simulation.autopilot.fence import Fence
 from peace_ros.simulation.autopilot.guided import PositionTarget
@@ -45,12 +49,15 @@ class Flight:
         personality: Personality | None = None,
         ground_msl_m: float = 0.0,
         errors: EstimateErrors | None = None,
+        gnss: GnssAltitudeError | None = None,
     ) -> None:
         self.physics = physics
         self.personality = personality or Personality()
         self._ground_msl_m = ground_msl_m
         self.estimator = Estimator(RECKONS_PX4_S if self.personality.is_px4 else RECKONS_S)
         self.errors = errors or EstimateErrors()
+        self.barometer = BarometerError()
+        self.gnss = gnss or GnssAltitudeError(0.0)
         self.fence = Fence()
         self.commander = SecondCommander()
         self.time_s = 0.0
@@ -92,7 +99,8 @@ class Flight:
             return self._last_position_m
         offset, wrong = self.estimator.offset_m, self.errors.position_m
         north, east, down = self._truth
-        return north + offset[0] + wrong[0], east + offset[1] + wrong[1], down + offset[2]
+        down += offset[2] - self.barometer.height_m
+        return north + offset[0] + wrong[0], east + offset[1] + wrong[1], down
 
     @property
     def velocity_m_s(self) -> tuple[float, float, float]:
@@ -101,7 +109,7 @@ class Flight:
         if self.physics.on_ground:
             return north, east, down  # a filter knows when it is at rest
         wrong = self.errors.velocity_m_s
-        return north + wrong[0], east + wrong[1], down
+        return north + wrong[0], east + wrong[1], down - self.barometer.climb_m_s
 
     @property
     def last_place_m(self) -> tuple[float, float, float]:
@@ -109,7 +117,7 @@ class Flight:
         if self.has_position:
             return self.position_m
         north, east, _ = self._last_position_m
-        return north, east, self.physics.down_m
+        return north, east, self.physics.down_m - self.barometer.height_m
 
     @property
     def landed_state(self) -> LandedState:
@@ -136,6 +144,9 @@ class Flight:
         """Advance the clock, the failsafes and the vehicle."""
         self.time_s += dt_s
         self.errors.step(dt_s)
+        self.barometer.step(dt_s)
+        self._steering.height_error_m = self.barometer.height_m
+        self.gnss.step(dt_s)
         failsafe = self.estimator.step(self.time_s)
         if self.has_position:
             self._last_position_m = self.position_m
@@ -162,13 +173,15 @@ class Flight:
     def _as_estimated(self, command: VelocityCommand) -> VelocityCommand:
         """Return what the vehicle really does: it flies by the velocity that it estimates.
 
-        Measured, PX4 v1.17-alpha: told 0.7 m/s it reports 0.45 m/s and hardly moves.
+        Measured, PX4 v1.17-alpha: told 0.7 m/s it reports 0.45 m/s and hardly moves. In the same
+        way a height that glides up lets the vehicle sink; that it does was not measured.
         """
         north, east = self.errors.velocity_m_s
         return replace(
             command,
             v_north_m_s=command.v_north_m_s - north,
             v_east_m_s=command.v_east_m_s - east,
+            v_down_m_s=command.v_down_m_s + self.barometer.climb_m_s,
         )
 
     def set_mode(self, number: int) -> Result:

@@ -101,6 +101,13 @@ class AutopilotParameters(ParameterSet):
     physics_rate_hz: float = parameter(
         100.0, 'Rate of the physics on the simulated clock.', unit='Hz', low=50.0, high=400.0
     )
+    gnss_altitude_noise_m: float = parameter(
+        2.5,
+        'Standard deviation of the error of the GNSS altitude, which changes within minutes.',
+        unit='m',
+        low=0.0,
+        high=20.0,
+    )
     rangefinder_max_m: float = parameter(
-        40.0, 'Range of the downward rangefinder.', unit='m', low=1.0, high=500.0
+        0.0, 'Range of the downward rangefinder; 0: there is none.', unit='m', low=0.0, high=500.0
     )

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from math import atan2, copysign, cos, exp, hypot, pi, radians, sin, sqrt, tan
 from random import Random
 
-from peace_ros.core.domain.geometry import Quaternion, quaternion_from_euler
+from peace_ros.core.domain.camera import Quaternion
+from peace_ros.core.domain.geometry import quaternion_from_euler
 
 GRAVITY_M_S2 = 9.80665
 DRAG_PER_M = GRAVITY_M_S2 * tan(radians(22.0)) / 8.0**2

@@ -58,6 +58,9 @@ class Steering:
         self._attitude: VelocityCommand | None = None
         self._attitude_age_s = 0.0
         self._hold: tuple[float, float, float] | None = None
+        """Where it stands, as the filter estimates it."""
+        self.height_error_m = 0.0
+        """Estimated minus true height."""
         self._home = (physics.north_m, physics.east_m)
         self._home_reached = False
         self._level_landing = False
@@ -164,17 +167,17 @@ class Steering:
 
     def _hold_point(self) -> VelocityCommand:
         """Stop; once standing, come back to that point whenever the wind pushes."""
-        p = self._physics
+        p, down_m = self._physics, self._physics.down_m - self.height_error_m
         if self._hold is None:
             v_north, v_east, v_down = p.velocity_ned_m_s
             if hypot(v_north, v_east, v_down) < STANDING_M_S:
-                self._hold = (p.north_m, p.east_m, p.down_m)
+                self._hold = (p.north_m, p.east_m, down_m)
             return VelocityCommand()
         north, east, down = self._hold
         return VelocityCommand(
             approach_speed_m_s(north - p.north_m, 1.0, LATERAL_BRAKING_M_S2),
             approach_speed_m_s(east - p.east_m, 1.0, LATERAL_BRAKING_M_S2),
-            approach_speed_m_s(down - p.down_m, 0.5, VERTICAL_BRAKING_M_S2),
+            approach_speed_m_s(down - down_m, 0.5, VERTICAL_BRAKING_M_S2),
         )
 
     def _climb_out(self, dt_s: float, altitude_m: float) -> VelocityCommand:

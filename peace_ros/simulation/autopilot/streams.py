@@ -192,20 +192,25 @@ class Streams:
         physics = flight.physics
         fix = flight.estimator.gps and flight.time_s >= READY_S / 4
         latitude, longitude = self._geodetic(physics.north_m, physics.east_m)
+        altitude_m = self._parameters.home_altitude_msl_m - physics.down_m + flight.gnss.error_m
         return mavlink.MAVLink_gps_raw_int_message(
             round(flight.time_s * 1e6),
-            mavlink.GPS_FIX_TYPE_RTK_FIXED if fix else mavlink.GPS_FIX_TYPE_NO_FIX,
+            mavlink.GPS_FIX_TYPE_3D_FIX if fix else mavlink.GPS_FIX_TYPE_NO_FIX,
             latitude if fix else 0,
             longitude if fix else 0,
-            round((self._parameters.home_altitude_msl_m - physics.down_m) * 1000) if fix else 0,
+            round(altitude_m * 1000) if fix else 0,
             121 if fix else UNKNOWN_U16,
             200 if fix else UNKNOWN_U16,
             UNKNOWN_U16,
             UNKNOWN_U16,
             10 if fix else 0,
+            v_acc=round(flight.gnss.size_m * 1000) if fix else 0,
         )
 
     def _distance_sensor(self, flight: Flight) -> Any:
+        """Return DISTANCE_SENSOR, None without a rangefinder."""
+        if self._parameters.rangefinder_max_m == 0.0:
+            return None
         tilt = min(flight.physics.tilt_rad, pi / 3)
         distance_cm = -flight.physics.down_m / cos(tilt) * 100.0
         return mavlink.MAVLink_distance_sensor_message(

@@ -5,9 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from peace_ros.core.domain import Distortion
+from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.simulation.demo.worlds import DemoWorld
 
 CAMERA_HZ = 10.0
@@ -30,8 +32,9 @@ class Wiring:
     """How the nodes of one run are connected."""
 
     world: DemoWorld
-    camera_px: int
-    """Width and height of the camera's image."""
+    camera: CameraOptions
+    lens: Distortion | None
+    """None: without distortion."""
     preset: Path
     speed: float
     mavlink: str
@@ -61,12 +64,14 @@ def node_arguments(wiring: Wiring) -> Arguments:
             'publish_clock': wiring.use_sim_time,
         }
         arguments['autopilot_sim'] = ros_arguments(autopilot)
-    camera = {'camera_width': wiring.camera_px, 'camera_height': wiring.camera_px}
+    camera = asdict(wiring.camera)
     arguments['satellite_view'] = ros_arguments({**clock, **camera, **_view(wiring)})
     arguments['prompt_generator'] = ros_arguments(clock, wiring.preset)
     arguments['segmentation'] = ros_arguments(clock, wiring.preset)
+    # What took the frames comes with them; only the mount is not in camera_info.
+    mount = {name: value for name, value in camera.items() if name.startswith('mount_')}
     arguments['landing'] = ros_arguments(
-        {**clock, **camera, 'mavlink': wiring.mavlink}, wiring.preset
+        {**clock, **mount, 'mavlink': wiring.mavlink}, wiring.preset
     )
     return arguments
 
@@ -81,6 +86,8 @@ def _view(wiring: Wiring) -> dict[str, object]:
         'start_y': float(world.start_north_m),
         'rate': CAMERA_HZ / wiring.speed,
     }
+    if wiring.lens is not None:
+        view.update(distortion_model=wiring.lens.model, distortion=list(wiring.lens.coefficients))
     if wiring.pose_mavlink is not None:
         view.update(pose_source='mavlink', pose_mavlink=wiring.pose_mavlink)
     return view

@@ -5,20 +5,21 @@
 from __future__ import annotations
 
 import socket
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Annotated
 
 from typer import Option
 
-from peace_ros.core.domain import Camera, ConfigurationError, VehicleError
+from peace_ros.core.domain import Camera, ConfigurationError, Distortion, VehicleError
 from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.recording.run_folder import create_run_folder
 
 DEFAULT_TIMEOUT_S = 330.0
 """Longer than the landing searches (max_search_s), so that "no safe place" can be its answer."""
 _SPEED_LIMITS = (0.1, 10.0)
+_SIDE_LIMITS_PX = (64, 4096)
 _GSD_LIMITS_M = (0.01, 5.0)
 AUTOPILOTS = ('ardupilot', 'px4')
 _NETWORK_KINDS = ('udp', 'udpin', 'udpout', 'udpbcast', 'tcp', 'tcpin')
@@ -62,13 +63,31 @@ class DemoOptions:
         str | None,
         Option(metavar='URL', help='A second connection to it, which the camera follows.'),
     ] = None
-    camera_px: Annotated[
-        int,
+    camera_size: Annotated[
+        str,
         Option(
-            metavar='N',
-            help='Side of the image; from 704 on it is also seen closer, in parts; takes time.',
+            '--camera',
+            metavar='WxH',
+            help='Size of the image; from 704 on it is also seen closer, in parts; takes time.',
         ),
-    ] = CameraOptions().camera_width
+    ] = '352x352'
+    fov_deg: Annotated[
+        float, Option('--fov', metavar='DEG', help='Full horizontal field of view.')
+    ] = CameraOptions().camera_fov
+    distortion: Annotated[
+        str | None,
+        Option(
+            metavar='[MODEL:]K1,K2,...',
+            help='Of the lens, as in CameraInfo: plumb_bob, rational_polynomial or equidistant.',
+        ),
+    ] = None
+    mount_pitch_deg: Annotated[
+        float, Option('--mount-pitch', metavar='DEG', help='The camera looks so far ahead.')
+    ] = 0.0
+    mount_yaw_deg: Annotated[
+        float,
+        Option('--mount-yaw', metavar='DEG', help='The top of the image is so far to the right.'),
+    ] = 0.0
     run_dir: Annotated[
         Path | None,
         Option(metavar='DIR', help='Empty or new folder; default runs/<time>-seed<seed>.'),
@@ -88,8 +107,7 @@ class DemoOptions:
             )
         if not 10.0 <= self.timeout_s <= 7200.0:
             raise ConfigurationError(f'--timeout {self.timeout_s} s: give 10 to 7200')
-        if not 64 <= self.camera_px <= 4096:
-            raise ConfigurationError(f'--camera-px {self.camera_px}: give 64 to 4096')
+        _ = self.camera
         if not 0 <= self.seed < 2**31:
             raise ConfigurationError(f'--seed {self.seed}: give 0 to {2**31 - 1}')
 
@@ -147,10 +165,26 @@ class DemoOptions:
             )
 
     @property
+    def camera_options(self) -> CameraOptions:
+        """Size, field of view and mount of the camera."""
+        width, height = parse_size(self.camera_size)
+        return CameraOptions(
+            camera_width=width,
+            camera_height=height,
+            camera_fov=self.fov_deg,
+            mount_pitch=self.mount_pitch_deg,
+            mount_yaw=self.mount_yaw_deg,
+        )
+
+    @property
+    def lens(self) -> Distortion | None:
+        """The distortion of the camera, None without any."""
+        return None if self.distortion is None else parse_distortion(self.distortion)
+
+    @property
     def camera(self) -> Camera:
-        """The square camera of the demo."""
-        options = CameraOptions(camera_width=self.camera_px, camera_height=self.camera_px)
-        return options.camera
+        """The camera with its lens."""
+        return replace(self.camera_options.camera, distortion=self.lens)
 
     @property
     def own_autopilot(self) -> bool:
@@ -190,6 +224,39 @@ def parse_start(text: str) -> tuple[float, float]:
     if not (abs(east) <= 1e5 and abs(north) <= 1e5):
         raise ConfigurationError(f'--start {text!r}: give at most 100000 m from the centre')
     return east, north
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Read ``WxH``: pixels of an image.
+
+    Raises:
+        ConfigurationError: anything else, or a size that no camera of the demo has.
+    """
+    width, cross, height = text.partition('x')
+    if not cross or not (width + height).isascii() or not (width.isdigit() and height.isdigit()):
+        raise ConfigurationError(f'--camera {text!r}: give WxH in pixels, e.g. 640x360')
+    size = int(width), int(height)
+    if not all(_SIDE_LIMITS_PX[0] <= each <= _SIDE_LIMITS_PX[1] for each in size):
+        raise ConfigurationError(
+            f'--camera {text}: give {_SIDE_LIMITS_PX[0]} to {_SIDE_LIMITS_PX[1]} pixels a side'
+        )
+    return size
+
+
+def parse_distortion(text: str) -> Distortion:
+    """Read ``[MODEL:]K1,K2,...``; without a model it is plumb_bob.
+
+    Raises:
+        ConfigurationError: anything else.
+    """
+    model, colon, numbers = text.rpartition(':')
+    try:
+        coefficients = tuple(float(each) for each in numbers.split(','))
+    except ValueError as error:
+        raise ConfigurationError(
+            f'--distortion {text!r}: give numbers with commas between them, e.g. -0.2,0.04,0,0'
+        ) from error
+    return Distortion(model if colon else 'plumb_bob', coefficients)
 
 
 def is_on_this_machine(url: str) -> bool:

@@ -12,6 +12,7 @@ from peace_ros.core.domain import VehicleError
 from peace_ros.core.vehicle import MavlinkLink, open_vehicle
 from peace_ros.simulation.demo.options import refuse_to_arm_elsewhere
 from peace_ros.simulation.demo.pilot import Pilot
+from peace_ros.simulation.positions import why_no_position
 
 CONNECT_S = 90.0
 _AGAIN_S = 1.0
@@ -54,6 +55,11 @@ class VehicleLine:
                 time.sleep(_AGAIN_S)
         if self._left and self._link is not None:
             self._link.close()
+
+    @property
+    def problem(self) -> str:
+        """Why the autopilot reports no position, empty when it does or was not reached yet."""
+        return '' if self._link is None else why_no_position(self._link)
 
     def bring_up(self, altitude_m: float, ready_s: float, say: Callable[[str], None]) -> None:
         """Bring the vehicle to an altitude, unless it is in the air already.

@@ -5,13 +5,15 @@
 from __future__ import annotations
 
 from collections import Counter
+from math import isfinite
 from pathlib import Path
 
 from rich.table import Table
 from rich.text import Text
 
-from peace_ros.core.domain import Camera, Pose
-from peace_ros.core.domain.geometry import ground_to_image
+from peace_ros.core.domain import Pose
+from peace_ros.core.domain.geometry import camera_pose, footprint_m, ground_to_camera
+from peace_ros.core.optics import pixels
 from peace_ros.recording import (
     FilmMoment,
     SiteMark,
@@ -21,6 +23,7 @@ from peace_ros.recording import (
     draw_trajectory,
     save_picture,
 )
+from peace_ros.simulation.camera import NadirCamera
 from peace_ros.simulation.demo.history import History, StateSpan
 from peace_ros.simulation.demo.summary import Summary, Truth
 
@@ -32,9 +35,7 @@ _WHOLE_IMAGE = 0.75
 """A focus of at least this part of the image's width is the whole image, and not drawn."""
 
 
-def draw_pictures(
-    history: History, summary: Summary, truth: Truth, camera: Camera, run_dir: Path
-) -> list[Path]:
+def draw_pictures(history: History, summary: Summary, truth: Truth, run_dir: Path) -> list[Path]:
     """Write ``trajectory.png`` and ``filmstrip.png``, as far as there is something to show.
 
     Raises:
@@ -45,7 +46,7 @@ def draw_pictures(
         picture = draw_trajectory(_scene(history, summary, truth))
         written.append(run_dir / 'trajectory.png')
         save_picture(picture, written[-1])
-    moments = _moments(history, camera)
+    moments = _moments(history, truth.camera)
     if moments:
         title = f'{summary.config}, {Path(summary.world).name}'
         written.append(run_dir / 'filmstrip.png')
@@ -136,28 +137,26 @@ def _scene(history: History, summary: Summary, truth: Truth) -> TrajectoryScene:
     )
 
 
-def _moments(history: History, camera: Camera) -> list[FilmMoment]:
+def _moments(history: History, eye: NadirCamera) -> list[FilmMoment]:
     spans = history.engaged_spans()
     if len(spans) > _MOST_MOMENTS:
         half = _MOST_MOMENTS // 2
         spans = spans[:half] + spans[-half:]
     since_ns = history.engaged_ns or 0
-    return [_moment(span, since_ns, camera) for span in spans]
+    return [_moment(span, since_ns, eye) for span in spans]
 
 
-def _moment(span: StateSpan, since_ns: int, camera: Camera) -> FilmMoment:
+def _moment(span: StateSpan, since_ns: int, eye: NadirCamera) -> FilmMoment:
     status, pose = span.status, span.pose
     centre, radius, site = None, None, None
     if pose is not None and pose.altitude_agl_m > 1.0:
         focus_m = status.number('focus_radius_m')
-        width_m = pose.altitude_agl_m / camera.focal_px * camera.width_px
+        width_m, _ = footprint_m(eye.camera, pose.altitude_agl_m)
         if focus_m is not None and focus_m / width_m < _WHOLE_IMAGE:
             radius = focus_m / width_m
             at = (status.number('focus_north_m'), status.number('focus_east_m'))
-            centre = _in_image(camera, pose, at)
-        site = _in_image(
-            camera, pose, (status.number('site_north_m'), status.number('site_east_m'))
-        )
+            centre = _in_image(eye, pose, at)
+        site = _in_image(eye, pose, (status.number('site_north_m'), status.number('site_east_m')))
     return FilmMoment(
         state=span.name,
         time_s=max(0.0, (span.begin_ns - since_ns) * 1e-9),
@@ -172,13 +171,15 @@ def _moment(span: StateSpan, since_ns: int, camera: Camera) -> FilmMoment:
 
 
 def _in_image(
-    camera: Camera, pose: Pose, ground: tuple[float | None, float | None]
+    eye: NadirCamera, pose: Pose, ground: tuple[float | None, float | None]
 ) -> tuple[float, float] | None:
     """Return where a ground point (north, east) is seen, as fractions of the image."""
     north_m, east_m = ground
     if north_m is None or east_m is None:
         return None
-    u, v, depth = (float(each) for each in ground_to_image(camera, pose) @ (north_m, east_m, 1.0))
-    if depth <= 0.0:
+    camera = eye.camera
+    direction = ground_to_camera(camera, camera_pose(eye.mount, pose)) @ (north_m, east_m, 1.0)
+    if direction[2] <= 0.0:
         return None
-    return u / depth / camera.width_px, v / depth / camera.height_px
+    u, v = (float(each[0]) for each in pixels(camera, direction[:, None]))
+    return (u / camera.width_px, v / camera.height_px) if isfinite(u + v) else None

@@ -28,6 +28,7 @@ from peace_ros.simulation.demo.report import draw_pictures, headline, summary_ta
 from peace_ros.simulation.demo.signals import interruptible
 from peace_ros.simulation.demo.summary import Ending, Setting, Summary, Truth, summarise
 from peace_ros.simulation.demo.worlds import DemoWorld, prepare_world
+from peace_ros.simulation.positions import SILENT_S
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 START_ALTITUDE_M = 100.0
@@ -72,7 +73,8 @@ class _Run:
         port = free_udp_port() if self.options.own_autopilot else None
         self.wiring = Wiring(
             world=self.world,
-            camera_px=self.options.camera_px,
+            camera=self.options.camera_options,
+            lens=self.options.lens,
             preset=self.preset.path,
             speed=self.speed,
             mavlink=self.options.mavlink or f'udpout:127.0.0.1:{port}',
@@ -100,7 +102,8 @@ def run_demo(options: DemoOptions, console: Console) -> int:
         domain = isolate(run_dir / 'logs' / 'ros')
         with console.status('preparing the world'):
             world = prepare_world(options, run_dir)
-        truth = Truth(NadirCamera(world.world, options.camera), landing.safety_radius_m)
+        eye = NadirCamera(world.world, options.camera, options.camera_options.mount)
+        truth = Truth(eye, landing.safety_radius_m)
         console.print(f'world: {world.note}', highlight=False)
         console.print(
             f'start {world.start_east_m:g},{world.start_north_m:g} m east, north of its centre; '
@@ -179,7 +182,14 @@ def _fly(run: _Run, monitor: Monitor, group: ProcessGroup) -> Ending:
         run.phase = f'waiting for the autopilot at {run.wiring.mavlink}'
         _beside(monitor, group, line.open)
         run.phase = 'waiting for the camera and the networks'
-        _wait(run, monitor, group, lambda: _sees(monitor), 'image and heatmap')
+        begin_s = time.monotonic()
+
+        def sees() -> bool:
+            images, heatmaps = monitor.heard(IMAGE), monitor.heard(HEATMAP)
+            run.phase = awaited(images, time.monotonic() - begin_s, line.problem)
+            return heatmaps >= _READY_HEATMAPS and images > 0
+
+        _wait(run, monitor, group, sees, 'image and heatmap')
         if run.measures_speed:
             _measure_speed(run, monitor, group)
         _beside(monitor, group, lambda: line.bring_up(START_ALTITUDE_M, run.ready_s, say))
@@ -193,8 +203,19 @@ def _fly(run: _Run, monitor: Monitor, group: ProcessGroup) -> Ending:
     return _follow(run, monitor, group)
 
 
-def _sees(monitor: Monitor) -> bool:
-    return monitor.heard(HEATMAP) >= _READY_HEATMAPS and monitor.heard(IMAGE) > 0
+def awaited(images: int, waited_s: float, problem: str) -> str:
+    """Return what a demo waits for before the vehicle is brought up.
+
+    Args:
+        images: Pictures of the camera so far.
+        waited_s: Since the autopilot was reached.
+        problem: Why the autopilot reports no position, empty when it does.
+    """
+    if images > 0:
+        return 'waiting for the networks'
+    if waited_s < SILENT_S:
+        return 'waiting for the camera and the networks'
+    return f'waiting for the camera: {problem or "its first picture has not come"}'
 
 
 def _measure_speed(run: _Run, monitor: Monitor, group: ProcessGroup) -> None:
@@ -242,7 +263,8 @@ def _wait(
         monitor.check()
         if time.monotonic() > deadline:
             raise VehicleError(
-                f'{what} did not come within {run.ready_s:g} s: see {run.run_dir / "logs"}'
+                f'{what} did not come within {run.ready_s:g} s ({run.phase}): see '
+                f'{run.run_dir / "logs"}'
             )
         time.sleep(_POLL_S)
 
@@ -303,6 +325,6 @@ def _finish(
 ) -> None:
     summary.write(run_dir / 'summary.json')
     with console.status('drawing the pictures'):
-        draw_pictures(monitor.history, summary, truth, truth.camera.camera, run_dir)
+        draw_pictures(monitor.history, summary, truth, run_dir)
     console.print(headline(summary))
     console.print(summary_table(summary, run_dir))

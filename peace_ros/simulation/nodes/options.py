@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from peace_ros.core.domain import ConfigurationError
+from peace_ros.core.domain import ConfigurationError, Distortion
+from peace_ros.core.domain.camera import DISTORTION_SIZES
 from peace_ros.core.domain.parameters import ParameterSet, parameter
 from peace_ros.core.node_parameters import CameraOptions, Group
 from peace_ros.core.vehicle import AUTO, check_access
@@ -44,6 +45,17 @@ class SatelliteViewOptions(ParameterSet):
         high=1e5,
     )
     start_y: float = parameter(0.0, 'The same to the north', unit='m', low=-1e5, high=1e5)
+    distortion_model: str = parameter(
+        'plumb_bob',
+        'Of the lens, as sensor_msgs/CameraInfo names it',
+        choices=tuple(DISTORTION_SIZES),
+    )
+    distortion: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0, 0.0, 0.0),
+        'Coefficients of the distortion as in CameraInfo; all 0: none',
+        low=-100.0,
+        high=100.0,
+    )
     rate: float = parameter(10.0, 'Frames per second of the pose', unit='Hz', low=0.1, high=120.0)
     pose_source: str = parameter(
         'topic',
@@ -70,8 +82,15 @@ class SatelliteViewOptions(ParameterSet):
         high=60.0,
     )
 
+    @property
+    def lens(self) -> Distortion | None:
+        """The distortion that the options describe."""
+        bends = any(self.distortion)
+        return Distortion(self.distortion_model, self.distortion) if bends else None
+
     def __post_init__(self) -> None:
         super().__post_init__()
+        _ = self.lens
         if self.pose_source == 'mavlink' and not self.pose_mavlink:
             raise ConfigurationError(
                 'parameter pose_source = mavlink without pose_mavlink: say where the autopilot is'

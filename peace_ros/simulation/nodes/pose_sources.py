@@ -23,6 +23,7 @@ from peace_ros.nodes.runtime import PeaceNode
 from peace_ros.simulation.nodes.messages import BODY_FRAME, transform_from_pose
 from peace_ros.simulation.nodes.options import CAMERA_SYSTEM_ID
 from peace_ros.simulation.nodes.twist_vehicle import TwistVehicle
+from peace_ros.simulation.positions import why_no_position
 
 _POLL_S = 0.02
 _INTEGRATION_HZ = 50.0
@@ -43,6 +44,11 @@ class TopicSource:
             self._sink(pose_from_message(message))
         except VehicleError as error:
             self._node.say('pose', str(error))
+
+    @property
+    def problem(self) -> str:
+        """Why no pose comes."""
+        return 'nothing publishes ground_truth/pose: is the simulated autopilot running?'
 
     def close(self) -> None:
         """Nothing to release."""
@@ -76,6 +82,12 @@ class MavlinkSource:
             self._output.publish(replace(pose, down_m=-pose.altitude_agl_m))
             self._sink(pose)
 
+    @property
+    def problem(self) -> str:
+        """Why no pose comes."""
+        link = self._connection.link
+        return self._connection.problem if link is None else why_no_position(link)
+
     def close(self) -> None:
         """Release the line."""
         self._connection.close()
@@ -97,6 +109,11 @@ class TwistSource:
             self._vehicle.command(linear.x, linear.y, linear.z, turn.z, time.monotonic())
         except VehicleError as error:
             self._node.say('cmd_vel', str(error))
+
+    @property
+    def problem(self) -> str:
+        """Why no pose comes."""
+        return 'the clock stands still'
 
     def _advance(self) -> None:
         pose = self._vehicle.advance(self._node.clock_ns(), time.monotonic())

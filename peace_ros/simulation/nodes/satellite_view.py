@@ -5,20 +5,22 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import CameraInfo, Image
 
 from peace_ros.core.domain import PeaceError, Pose
+from peace_ros.core.messages import CAMERA_FRAME
 from peace_ros.core.node_parameters import CameraOptions
-from peace_ros.nodes.messages import image_message
+from peace_ros.nodes.messages import camera_info, image_message
 from peace_ros.nodes.qos import IMAGE_OUT, RESULT
 from peace_ros.nodes.runtime import PeaceNode, run
 from peace_ros.nodes.worker import NewestWorker
 from peace_ros.simulation.camera import NadirCamera
-from peace_ros.simulation.nodes.messages import camera_info
 from peace_ros.simulation.nodes.options import SATELLITE_VIEW, SatelliteViewOptions
 from peace_ros.simulation.nodes.pose_sources import (
     MavlinkSource,
@@ -26,7 +28,10 @@ from peace_ros.simulation.nodes.pose_sources import (
     TopicSource,
     TwistSource,
 )
+from peace_ros.simulation.positions import SILENT_S
 from peace_ros.simulation.world import World, draw_world, load_world
+
+_LOOK_S = 0.5
 
 
 def create_world(options: SatelliteViewOptions) -> World:
@@ -53,15 +58,18 @@ class SatelliteViewNode(PeaceNode):
         """
         super().__init__('satellite_view', *SATELLITE_VIEW, **options)
         chosen = self.filled(SatelliteViewOptions)
-        self._camera = self.filled(CameraOptions).camera
-        self._view = NadirCamera(create_world(chosen), self._camera)
+        placed = self.filled(CameraOptions)
+        self._camera = replace(placed.camera, distortion=chosen.lens)
+        self._view = NadirCamera(create_world(chosen), self._camera, placed.mount)
         self._period_ns = round(1e9 / chosen.rate)
         self._due_ns: int | None = None
         self._said_mirrored = False
         self._image_out = self.create_publisher(Image, 'image', IMAGE_OUT)
         self._info_out = self.create_publisher(CameraInfo, 'camera_info', RESULT)
         self._worker = NewestWorker(self._render, self._complain, self.fail, 'satellite_view')
+        self._seen_s = time.monotonic()
         self._source = self._create_source(chosen)
+        self.create_timer(_LOOK_S, self._explain, clock=Clock(clock_type=ClockType.STEADY_TIME))
         east_m, north_m = self._view.world.size_m
         self.get_logger().info(
             f'ready: world {self._view.world.name} of {east_m:.0f} x {north_m:.0f} m, '
@@ -79,6 +87,7 @@ class SatelliteViewNode(PeaceNode):
 
     def _on_pose(self, pose: Pose) -> None:
         """Keep the frame rate by the stamps, so that it holds on any clock."""
+        self._seen_s = time.monotonic()
         due_ns, period_ns = self._due_ns, self._period_ns
         if due_ns is not None and due_ns - 2 * period_ns < pose.stamp_ns < due_ns:
             return
@@ -86,10 +95,17 @@ class SatelliteViewNode(PeaceNode):
         self._due_ns = (pose.stamp_ns if late or due_ns is None else due_ns) + period_ns
         self._worker.offer(pose)
 
+    def _explain(self) -> None:
+        """Say why nothing is seen, after a while without a pose."""
+        if time.monotonic() - self._seen_s >= SILENT_S and self._source.problem:
+            self.say('camera', f'waiting for the camera: {self._source.problem}')
+
     def _render(self, pose: Pose) -> None:
         view = self._view.view(pose)
+        # Before the image, which it belongs to.
+        size_px = self._camera.width_px, self._camera.height_px
+        self._info_out.publish(camera_info(size_px, self._camera, pose.stamp_ns, CAMERA_FRAME))
         self._image_out.publish(image_message(view.image_rgb, 'rgb8', pose.stamp_ns))
-        self._info_out.publish(camera_info(self._camera, pose.stamp_ns))
         if view.mirrored and not self._said_mirrored:
             self._said_mirrored = True
             self.get_logger().warning(

@@ -2,22 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frame conversions, each against what a person can check by hand."""
 
-from math import degrees, radians, tan
+from math import degrees, isfinite, pi, radians, tan
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from peace_ros.core.domain import Camera, Pose
+from peace_ros.core.domain import NADIR, Camera, Pose
 from peace_ros.core.domain.geometry import (
     attitude_enu_flu_to_ned_frd,
     attitude_ned_frd_to_enu_flu,
+    camera_pose,
     enu_to_ned,
     footprint_m,
     ground_to_image,
-    image_to_ground,
     interpolate,
+    lean_acceleration,
+    mount_from_degrees,
+    mount_from_optical,
     ned_to_enu,
     quaternion_from_euler,
     rotation_matrix,
@@ -40,7 +43,7 @@ def pixel_of(north: float, east: float, at: Pose) -> tuple[float, float]:
 
 
 def centre_looks_at(at: Pose) -> tuple[float, float]:
-    n, e, scale = image_to_ground(CAMERA, at) @ [*CAMERA.centre_px, 1.0]
+    n, e, scale = np.linalg.inv(ground_to_image(CAMERA, at)) @ [*CAMERA.centre_px, 1.0]
     return n / scale, e / scale
 
 
@@ -104,7 +107,7 @@ def test_image_and_ground_are_inverse(
     roll: float, pitch: float, yaw: float, north: float, east: float
 ) -> None:
     at = pose(roll, pitch, yaw)
-    ground = image_to_ground(CAMERA, at) @ [*pixel_of(north, east, at), 1.0]
+    ground = np.linalg.inv(ground_to_image(CAMERA, at)) @ [*pixel_of(north, east, at), 1.0]
     assert np.allclose(ground[:2] / ground[2], [north, east], atol=1e-6)
 
 
@@ -126,3 +129,63 @@ def test_slerp_takes_the_shorter_arc() -> None:
     a = quaternion_from_euler(0, 0, radians(170))
     b = quaternion_from_euler(0, 0, radians(-170))
     assert abs(degrees(yaw_from_quaternion(slerp(a, b, 0.5)))) == pytest.approx(180.0)
+
+
+@pytest.mark.parametrize(
+    ('roll', 'pitch', 'yaw', 'north', 'east'),
+    [
+        (0.0, 0.0, 1.0, 0.0, 0.0),
+        (0.0, -0.3, 0.0, 9.80665 * tan(0.3), 0.0),
+        (0.3, 0.0, 0.0, 0.0, 9.80665 * tan(0.3)),
+        (0.3, 0.0, pi / 2.0, -9.80665 * tan(0.3), 0.0),
+    ],
+)
+def test_the_thrust_of_a_multicopter_accelerates_it_to_where_it_leans(
+    roll: float, pitch: float, yaw: float, north: float, east: float
+) -> None:
+    lean = lean_acceleration(quaternion_from_euler(roll, pitch, yaw))
+    assert lean == pytest.approx((north, east), abs=1e-9)
+    assert all(isfinite(each) for each in lean_acceleration(quaternion_from_euler(pi, pitch, yaw)))
+
+
+NOWHERE = (0.0, 0.0, 0.0)
+
+
+def test_a_mounted_camera_looks_where_a_person_would_say() -> None:
+    """Heading north, 100 m up: pitch ahead, roll to the left, yaw turns the picture."""
+    for turns, (north, east) in (
+        ((0.0, 15.0, 0.0), (100 * tan(radians(15)), 0.0)),
+        ((15.0, 0.0, 0.0), (0.0, -100 * tan(radians(15)))),
+        ((0.0, 15.0, 90.0), (0.0, 100 * tan(radians(15)))),
+    ):
+        seen = centre_looks_at(camera_pose(mount_from_degrees(turns, NOWHERE), pose()))
+        assert seen == pytest.approx((north, east), abs=1e-9)
+
+
+def test_a_camera_turned_by_90_deg_has_the_right_side_at_the_top() -> None:
+    turned = camera_pose(mount_from_degrees((0.0, 0.0, 90.0), NOWHERE), pose())
+    u, v = pixel_of(0, 10, turned)  # 10 m east of a vehicle that heads north
+    assert u == pytest.approx(175.5)
+    assert v < 175.5
+
+
+def test_the_place_of_the_camera_turns_with_the_vehicle() -> None:
+    mount = mount_from_degrees((0.0, 0.0, 0.0), (2.0, 1.0, 0.5))
+    east = camera_pose(mount, pose(yaw=radians(90)))
+    assert (east.north_m, east.east_m) == pytest.approx((-1.0, 2.0))
+    assert (east.down_m, east.altitude_agl_m) == pytest.approx((-99.5, 99.5))
+
+
+def test_the_mount_by_parameters_and_by_an_optical_frame_are_the_same() -> None:
+    """In base_link (forward, left, up) a nadir picture has its right at -y, its down at -x."""
+    half = 0.5**0.5
+    assert rotation_matrix((0.0, half, -half, 0.0)) == pytest.approx(
+        np.array([[0, -1, 0], [-1, 0, 0], [0, 0, -1]]), abs=1e-9
+    )
+    nadir = mount_from_optical((0.0, half, -half, 0.0), (1.0, 2.0, 3.0))
+    assert nadir.quaternion == pytest.approx(NADIR.quaternion)
+    assert nadir.offset_frd_m == (1.0, -2.0, -3.0)
+    # Looking straight ahead with the top up: right is -y, down is -z, the view is x.
+    ahead = mount_from_optical((0.5, -0.5, 0.5, -0.5), NOWHERE)
+    by_parameters = mount_from_degrees((0.0, 90.0, 0.0), NOWHERE)
+    assert ahead.quaternion == pytest.approx(by_parameters.quaternion)

@@ -12,6 +12,8 @@ import pytest
 
 from peace_ros.core.domain import BundleError, ConfigurationError
 from peace_ros.core.inference import Bundle, Session, open_sessions
+from peace_ros.core.inference.providers import CPU, CUDA, TENSORRT
+from peace_ros.core.inference.session import providers_of_role
 
 CLIPSEG_ROLES = ('image_encoder', 'text_encoder', 'decoder')
 
@@ -120,3 +122,22 @@ def test_the_encoder_of_another_bundle_does_not_pass_for_ours(tiny: Any, tmp_pat
     tiny.resign(ours)
     with pytest.raises(BundleError, match='image_embedding'):
         open_sessions(Bundle.load(ours), CLIPSEG_ROLES)
+
+
+@pytest.mark.parametrize(
+    ('family', 'role', 'has_tensorrt'),
+    [
+        ('clipseg', 'image_encoder', True),
+        ('clipseg', 'decoder', True),
+        ('clipseg', 'text_encoder', False),
+        ('fastsam', 'segmenter', True),
+        ('fastsam', 'image_encoder', False),
+    ],
+)
+def test_tensorrt_runs_only_networks_whose_inputs_keep_their_shape(
+    family, role, has_tensorrt
+) -> None:
+    chosen = providers_of_role(family, role, (TENSORRT, CUDA))
+    assert chosen == ((TENSORRT, CUDA) if has_tensorrt else (CUDA,))
+    if not has_tensorrt:
+        assert providers_of_role(family, role, (TENSORRT,)) == (CPU,)

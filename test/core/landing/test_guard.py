@@ -297,3 +297,10 @@ def test_a_change_of_direction_begins_at_zero():
         guard.limit(Setpoint(0, 4.0, -4.0, 0.0), seen(now_ns=step * 500_000_000))
     out, _ = guard.limit(Setpoint(0, -4.0, -2.0, 0.0), seen(now_ns=9 * 500_000_000 + 10**8))
     assert (out.v_north_m_s, out.v_east_m_s) == pytest.approx((-0.3, -2.0))
+
+
+def test_the_floor_counts_from_the_lowest_height():
+    down = Setpoint(7, v_down_m_s=3.0)
+    low = replace(seen(26.0), above_lowest_m=4.0)
+    assert limited(down, low)[0].v_down_m_s == pytest.approx(2.0)
+    assert limited(down, replace(low, above_lowest_m=6.0))[0].is_zero

@@ -11,6 +11,7 @@ import pytest
 
 from peace_ros.core.domain import Pose, Site, Telemetry
 from peace_ros.core.landing import Decision, Focus, LandingParameters, State, Verdict
+from peace_ros.core.landing.heights import NO_OTHER_HEIGHT, HeightSight
 from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.situation import Sighting
 
@@ -47,6 +48,7 @@ class Steps:
         later_s: float = 0.1,
         frames: int = 0,
         rejection: str = '',
+        heights: HeightSight = NO_OTHER_HEIGHT,
         **sighting: object,
     ) -> Decision:
         self.at_s += later_s
@@ -60,7 +62,7 @@ class Steps:
         )
         telemetry = replace(self.telemetry, pose=pose or pose_of())
         return self.helm.decide(
-            round(self.at_s * S), telemetry, self.age_s, self.sighting, rejection
+            round(self.at_s * S), telemetry, self.age_s, self.sighting, rejection, heights
         )
 
 
@@ -179,6 +181,29 @@ def test_bad_data_hold_and_their_site_does_not_count() -> None:
     )
     assert steps.step(map_age_s=inf).state is State.HOLD
     assert steps.step(map_age_s=0.1).state is State.SEARCHING
+
+
+def test_heights_that_disagree_hold_with_their_sentence() -> None:
+    steps = Steps(state=State.LANDING)
+    doubt = HeightSight('20.2 m by the autopilot and 12.2 m by pictures', heights_m={'GNSS': 13.0})
+    decision = steps.step(pose_of(30.0), site_at(), heights=doubt)
+    assert decision.state is State.HOLD
+    assert decision.reason == doubt.problem
+    assert decision.setpoint.is_zero
+    assert decision.heights_m == {'GNSS': 13.0}
+    assert steps.step(pose_of(30.0), site_at()).state is State.SEARCHING
+
+
+def test_the_lowest_height_decides_on_hand_over_and_the_end_of_aiming() -> None:
+    above = HeightSight(above_lowest_m=2.0)
+    steps = Steps(state=State.LANDING)
+    assert steps.step(pose_of(22.4), site_at(), heights=above).state is State.LANDING
+    waits = replace(above, may_hand_over=False)
+    assert steps.step(pose_of(22.3), site_at(), heights=waits).state is State.LANDING
+    assert steps.step(pose_of(22.3), site_at(), heights=above).state is State.HANDOVER
+    steps = Steps(state=State.AIMING)
+    assert steps.step(pose_of(58.1), site_at(), heights=above).state is State.AIMING
+    assert steps.step(pose_of(57.9), site_at(), heights=above).state is State.LANDING
 
 
 def test_a_takeover_aborts_for_good() -> None:

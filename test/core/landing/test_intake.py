@@ -8,8 +8,8 @@ from math import nan, radians
 import numpy as np
 import pytest
 
-from peace_ros.core.domain import Camera, Heatmap, Pose
-from peace_ros.core.domain.geometry import quaternion_from_euler
+from peace_ros.core.domain import NADIR, Camera, DepthImage, Frame, Heatmap, Mount, Pose
+from peace_ros.core.domain.geometry import mount_from_degrees, quaternion_from_euler
 from peace_ros.core.landing import LandingParameters
 from peace_ros.core.landing.intake import HeatmapIntake
 from peace_ros.core.mapping import MapParameters, SafetyMap
@@ -206,3 +206,96 @@ def test_values_that_are_no_safety_are_rejected(intake, value, fate):
     intake.add_heatmap(heatmap_of(2.1, value))
     assert intake.counts[fate] == 1
     assert intake.last_rejection == fate
+
+
+def seen_by(heatmap: Heatmap, size_px=None, camera=None) -> Heatmap:
+    return replace(heatmap, frame_size_px=size_px, camera=camera)
+
+
+WIDE = Camera.from_degrees(640, 360, 90.0)
+
+
+@pytest.mark.parametrize('size_px', [(640, 360), (704, 704), (640, 480)])
+def test_frames_of_another_size_than_the_parameters_say_are_not_used(intake, safety_map, size_px):
+    before = safety_map.stamp_ns
+    intake.add_pose(pose_of(2.1))
+    intake.add_heatmap(seen_by(heatmap_of(2.1), size_px))
+    assert safety_map.stamp_ns == before
+    assert f'{size_px[0]} x {size_px[1]} px' in intake.last_rejection
+    assert '352 x 352 px' in intake.last_rejection
+    intake.add_pose(pose_of(2.2))
+    intake.add_heatmap(seen_by(heatmap_of(2.2), (352, 352)))
+    assert safety_map.stamp_ns == round(2.2 * S)
+
+
+def test_a_heatmap_that_names_no_frame_is_taken_for_one_by_its_shape(intake, safety_map):
+    before = safety_map.stamp_ns
+    intake.add_pose(pose_of(2.1))
+    intake.add_heatmap(Heatmap(np.full((48, 64), 0.9, np.float32), round(2.1 * S)))
+    assert safety_map.stamp_ns == before
+    assert 'a heatmap of 64 x 48 px' in intake.last_rejection
+
+
+def test_a_calibrated_frame_is_projected_with_its_own_camera(intake, safety_map):
+    """The parameters would let it end 37 m to each side, its own camera shows 50 m by 28 m."""
+    safety_map.clear()
+    intake.add_pose(pose_of(2.1))
+    intake.add_heatmap(seen_by(heatmap_of(2.1), (640, 360), WIDE))
+    seen = np.argwhere(safety_map.layers(round(2.1 * S)).looks)
+    assert np.ptp(seen, axis=0) * 0.5 == pytest.approx([53.0, 94.0], abs=1.5)
+
+
+def test_another_calibration_drops_the_map_that_was_seen_with_the_first(intake, safety_map):
+    for tick in (21, 22):
+        intake.add_pose(pose_of(0.1 * tick))
+        intake.add_heatmap(seen_by(heatmap_of(0.1 * tick), (640, 360), WIDE))
+    assert intake.drops == 1
+    assert safety_map.layers(round(2.2 * S)).looks.max() == 2
+
+
+def test_after_calibrated_frames_one_without_calibration_is_not_used(intake, safety_map):
+    intake.add_pose(pose_of(2.1))
+    intake.add_heatmap(seen_by(heatmap_of(2.1), (352, 352), CAMERA))
+    intake.add_pose(pose_of(2.2))
+    intake.add_heatmap(seen_by(heatmap_of(2.2), (352, 352)))
+    assert safety_map.stamp_ns == round(2.1 * S)
+    assert 'camera_info is missing' in intake.last_rejection
+
+
+def test_nothing_is_used_until_the_mount_of_the_camera_is_known(safety_map):
+    intake = HeatmapIntake(LandingParameters(), CAMERA, safety_map, None)
+    intake.add_pose(pose_of(1.0))
+    intake.add_heatmap(heatmap_of(1.0))
+    assert safety_map.stamp_ns is None
+    assert 'mounted' in intake.last_rejection
+    intake.place_camera(NADIR)
+    intake.add_pose(pose_of(1.1))
+    intake.add_heatmap(heatmap_of(1.1))
+    assert safety_map.stamp_ns == round(1.1 * S)
+
+
+def test_a_camera_that_looks_ahead_sees_what_is_ahead(safety_map):
+    mount = mount_from_degrees((0.0, 15.0, 0.0), (0.0, 0.0, 0.0))
+    intake = HeatmapIntake(LandingParameters(), CAMERA, safety_map, mount)
+    for tick in range(1, 5):
+        intake.add_pose(pose_of(0.1 * tick))
+        intake.add_heatmap(heatmap_of(0.1 * tick))
+    layers = safety_map.layers(round(0.4 * S))
+    north, east = layers.centre_of(*np.argwhere(layers.looks).mean(axis=0))
+    assert north > 10.0
+    assert east == pytest.approx(0.0, abs=0.3)
+
+
+def test_another_mount_drops_the_map(intake, safety_map):
+    intake.place_camera(NADIR)
+    assert safety_map.stamp_ns is not None
+    intake.place_camera(Mount(offset_frd_m=(0.5, 0.0, 0.0)))
+    assert safety_map.stamp_ns is None
+    assert 'mounted otherwise' in intake.last_rejection
+
+
+def test_pictures_and_depth_of_another_shape_are_counted_and_not_used(intake):
+    intake.add_view(Frame(np.full((36, 64, 3), 9, np.uint8), round(2.0 * S)))
+    intake.add_depth(DepthImage(np.full((36, 64), 9.0, np.float32), round(2.0 * S)))
+    assert intake.counts['picture of another shape than the frames'] == 1
+    assert intake.counts['depth of another shape than the frames'] == 1

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from peace_ros.core.domain import Camera, Frame, Heatmap, Pose
-from peace_ros.core.domain.geometry import quaternion_from_euler
+from peace_ros.core.domain.geometry import ground_to_image, quaternion_from_euler
 from peace_ros.core.landing import LandingParameters
 from peace_ros.core.landing.intake import HeatmapIntake
 from peace_ros.core.landing.odometry import VisualOdometry
@@ -61,9 +61,7 @@ class Outage:
 
     @staticmethod
     def _image_from_ground(pose: Pose) -> np.ndarray:
-        from peace_ros.core.mapping.projection import heatmap_from_ground
-
-        return heatmap_from_ground(CAMERA, pose, 64, 64)
+        return ground_to_image(CAMERA.resized(64, 64), pose)
 
     def run(self, until_s: float) -> None:
         while self.time_s < until_s - 1e-9:

@@ -244,3 +244,10 @@ def test_beyond_its_radius_a_square_begins_anew() -> None:
     assert nowhere.target(pose_of(60.0)) == (7.0, 8.0)
     just = ExpandingSquare((7.0, 8.0), 50.0, 50.0)
     assert just.target(pose_of(60.0)) == (57.0, 8.0)
+
+
+def test_a_descent_ends_where_the_lowest_height_does() -> None:
+    site = site_at(0.0, 0.0)
+    alone, _ = flown(State.LANDING, 21.0, site)
+    assert flown(State.LANDING, 25.0, site, above_lowest_m=4.0)[0] == pytest.approx(alone)
+    assert flown(State.LANDING, 25.0, site, above_lowest_m=5.0)[0] == (0.0, 0.0, 0.0)

@@ -39,8 +39,9 @@ def test_large_pictures_are_read_at_every_second_or_third_pixel(
     assert known.all()
     camera = CAMERA.resized(width, height)
     u, v = (columns - (width - 1) / 2), (rows - (height - 1) / 2)
-    np.testing.assert_allclose(offsets[0], np.tile(-v / camera.focal_px * 10, (len(u), 1)).T)
-    np.testing.assert_allclose(offsets[1], np.tile(u / camera.focal_px * 10, (len(v), 1)))
+    fx, fy = camera.focal_xy_px
+    np.testing.assert_allclose(offsets[0], np.tile(-v / fy * 10, (len(u), 1)).T)
+    np.testing.assert_allclose(offsets[1], np.tile(u / fx * 10, (len(v), 1)))
     np.testing.assert_allclose(offsets[2], 10.0)
 
 

@@ -35,7 +35,7 @@ def picture(value: int, rows: slice, columns: slice) -> np.ndarray:
 @pytest.mark.parametrize(('value', 'found'), [(0, True), (64, True), (65, False)])
 def test_a_blob_is_clearly_unsafe(value: int, found: bool) -> None:
     safety = picture(value, slice(10, 13), slice(20, 23))
-    assert (blobs(safety, 0.1, 1.0, PARAMETERS) is not None) == found
+    assert (blobs(safety, (0.1, 0.1), 0.1, PARAMETERS) is not None) == found
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_blobs_stay_where_they_are_and_grow_by_half_a_cell(
     pixel_m: float, per_cell: float, px: int, grown: int
 ) -> None:
     safety = picture(30, slice(10, 10 + px), slice(20, 20 + px))
-    found = blobs(safety, pixel_m, per_cell, PARAMETERS)
+    found = blobs(safety, (pixel_m, pixel_m), per_cell * pixel_m, PARAMETERS)
     assert found is not None
     expected = np.zeros_like(safety)
     expected[10 - grown : 10 + px + grown, 20 - grown : 20 + px + grown] = 255
@@ -62,7 +62,7 @@ def test_blobs_stay_where_they_are_and_grow_by_half_a_cell(
 @pytest.mark.parametrize(('pixel_m', 'px'), [(0.1, 2), (0.05, 5), (0.3, 1), (0.36, 9)])
 def test_smaller_blobs_and_coarser_pictures_are_none(pixel_m: float, px: int) -> None:
     safety = picture(30, slice(10, 10 + px), slice(20, 20 + px))
-    assert blobs(safety, pixel_m, 1.0, PARAMETERS) is None
+    assert blobs(safety, (pixel_m, pixel_m), pixel_m, PARAMETERS) is None
 
 
 class Looks:

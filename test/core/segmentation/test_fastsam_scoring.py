@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as npst
 
 from peace_ros.core.segmentation.fastsam.scoring import is_usable, term_shares
 
-_VALUES = st.floats(-8.0, 8.0, width=32).filter(lambda value: abs(value) > 1e-3)
+_VALUES = st.floats(2**-10, 8.0, width=32) | st.floats(-8.0, -(2**-10), width=32)
 
 
 def vectors(rows: int) -> st.SearchStrategy:

@@ -18,7 +18,12 @@ INPUT = (352, 352)
     ('image_wh', 'most', 'grid'),
     [
         ((352, 352), 10, (1, 1)),
-        ((640, 480), 10, (1, 1)),
+        ((640, 480), 10, (2, 1)),
+        ((640, 360), 10, (2, 1)),
+        ((360, 640), 10, (1, 2)),
+        ((640, 360), 2, (1, 1)),
+        ((630, 360), 10, (1, 1)),
+        ((640, 520), 10, (1, 1)),
         ((704, 704), 10, (2, 2)),
         ((1056, 1056), 10, (3, 3)),
         ((1056, 1056), 9, (2, 3)),
@@ -47,7 +52,7 @@ def test_the_sharper_direction_gives_up_a_part_whatever_the_input() -> None:
 
 
 @given(st.integers(1, 5000), st.integers(1, 5000), st.integers(1, 101))
-def test_parts_share_the_frame_among_them_and_none_is_enlarged(
+def test_parts_share_the_frame_among_them_and_none_is_enlarged_much(
     width: int, height: int, most: int
 ) -> None:
     parts = parts_of((width, height), INPUT, most)
@@ -68,7 +73,7 @@ def test_parts_share_the_frame_among_them_and_none_is_enlarged(
             (part.columns, part.own_columns, width),
         ):
             assert 0 <= seen.start <= own.start < own.stop <= seen.stop <= length
-            assert own.stop - own.start == length or own.stop - own.start >= 351
+            assert own.stop - own.start == length or own.stop - own.start >= 316
 
 
 def test_what_parts_answer_lies_where_they_lie() -> None:

@@ -276,6 +276,75 @@ def test_the_rangefinder_counts_downward_and_in_range(message, altitude_m):
     assert assembler.telemetry(0).pose.altitude_agl_m == pytest.approx(altitude_m)
 
 
+def fix(alt_m, fix_type=3, v_acc_m=0.0):
+    return mavlink.MAVLink_gps_raw_int_message(
+        0, fix_type, 0, 0, round(alt_m * 1e3), 0, 0, 0, 0, 9, v_acc=round(v_acc_m * 1e3)
+    )
+
+
+def terrain(height_m, spacing=100):
+    return mavlink.MAVLink_terrain_report_message(0, 0, spacing, 580.0, height_m, 0, 9)
+
+
+@pytest.mark.parametrize(
+    ('message', 'source', 'height_m', 'error_m'),
+    [
+        (fix(615.0), 'GNSS', 615.0, 3.0),
+        (fix(615.0, v_acc_m=1.7), 'GNSS', 615.0, 1.7),
+        (fix(615.0, v_acc_m=0.02), 'GNSS', 615.0, 1.0),
+        (terrain(33.0), 'terrain data', 33.0, 5.0),
+        (range_message(2500), 'rangefinder', 25.0 * cos(radians(20)), 0.3),
+    ],
+)
+def test_other_heights_are_reported_while_they_are_fresh(
+    assembler, message, source, height_m, error_m
+):
+    assembler.take(message, 0, 0)
+    for second in (0, 1, 2, 3):
+        assembler.take(position(1000 + 1000 * second), 0, second * SECOND)
+        assembler.take(attitude(1000 + 1000 * second, roll=radians(20)), 0, second * SECOND)
+        heights = assembler.telemetry(second * SECOND).heights
+        assert len(heights) == (second < 3)
+    first = assembler.telemetry(2 * SECOND).heights[0]
+    assert first.source == source
+    assert first.height_m == pytest.approx(height_m)
+    assert first.error_m == error_m
+    assert first.above_ground is (source != 'GNSS')
+    assert first.is_narrow is (source == 'rangefinder')
+
+
+@pytest.mark.parametrize(
+    ('good', 'bad', 'rejected'),
+    [
+        (fix(615.0), fix(0.0, fix_type=2), 0),
+        (range_message(3900), range_message(4100), 0),
+        (None, range_message(900, 0), 0),
+        (None, terrain(33.0, spacing=0), 0),
+        (None, terrain(nan), 1),
+        (None, fix(3e5), 1),
+    ],
+)
+def test_what_is_no_height_is_not_reported(assembler, good, bad, rejected):
+    assembler.take(position(), 0, 0)
+    assembler.take(attitude(), 0, 0)
+    if good is not None:
+        assembler.take(good, 0, 0)
+        assert assembler.telemetry(0).heights
+    assembler.take(bad, 0, 0)
+    assert not assembler.telemetry(0).heights
+    assert assembler.rejected == rejected
+
+
+def test_a_single_message_moves_no_other_height(assembler):
+    assembler.take(position(), 0, 0)
+    assembler.take(attitude(), 0, 0)
+    told = []
+    for altitude_m in (615.0, 700.0, 616.0, 616.0, 640.0, 640.0):
+        assembler.take(fix(altitude_m), 0, 0)
+        told.append(assembler.telemetry(0).heights[0].height_m)
+    assert told == [615.0, 615.0, 615.0, 616.0, 616.0, 640.0]
+
+
 def test_long_texts_are_put_together(assembler):
     for chunk, text in enumerate((b'x' * 50, b'yz')):
         assembler.take(mavlink.MAVLink_statustext_message(4, text, 7, chunk), 0, 0)

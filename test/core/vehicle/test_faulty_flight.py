@@ -148,6 +148,23 @@ def test_altitude_is_above_home_wherever_the_origin_lies(hovering, eventually, a
         link.close()
 
 
+@pytest.mark.parametrize('autopilot', ['ardupilot', 'px4'])
+def test_dead_reckoning_after_the_loss_of_gnss_is_not_flown_by(hovering, eventually, autopilot):
+    """The filter goes on for 7.1 s (PX4: 5.4 s), and its flags stay as they were."""
+    with hovering(20.0, 1.0, autopilot=autopilot) as sim:
+        link = open_vehicle(sim.url)
+        assert eventually(lambda: link.telemetry().pose is not None)
+        sim.lose_gps()
+        begun_s = time.monotonic()
+        assert eventually(lambda: link.telemetry().pose is None)
+        assert time.monotonic() - begun_s < 1.0
+        assert sim.flight.estimator.reports_position(sim.flight.time_s)
+        assert 'GNSS has lost its fix' in link.telemetry().position_problem
+        sim.restore_gps()
+        assert eventually(lambda: link.telemetry().pose is not None)
+        link.close()
+
+
 def test_attitude_and_altitude_go_on_when_the_position_is_lost(flying, eventually):
     sim, link = flying
     sim.lose_gps()

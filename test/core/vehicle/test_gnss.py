@@ -60,3 +60,12 @@ def test_a_filter_that_outlives_dead_reckoning_has_another_source(watch):
 @pytest.mark.parametrize('known', [False, None])
 def test_a_filter_that_lost_it_or_says_nothing_is_no_evidence(watch, known):
     assert lose(watch, known=known) is None
+
+
+def test_a_missing_fix_is_noted_before_there_was_any():
+    watch = GnssWatch()
+    assert watch.fix_note == ''
+    watch.take(FIRST, 1, 0, known=False)
+    assert watch.fix_note == 'fix type 1, 3 is needed'
+    watch.take(SECOND, 3, 100, known=False)
+    assert watch.fix_note == ''

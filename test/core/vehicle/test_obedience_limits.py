@@ -10,7 +10,7 @@ from random import Random
 
 import pytest
 
-from peace_ros.core.vehicle.obedience import ObedienceWatch, Vector
+from peace_ros.core.vehicle.obedience import ObedienceWatch, ReportedMotion, Vector
 
 STEP_S = 0.0625
 Told = Callable[[float], Vector]
@@ -21,12 +21,28 @@ def frozen(_at_s: float) -> Vector:
     return (4.0, -3.0, -50.0)
 
 
+STANDING = ReportedMotion(frozen(0.0), (0.0, 0.0))
+
+
 def steady(north: float = 0.0, east: float = 0.0, down: float = 0.0) -> Told:
     return lambda _at_s: (north, east, down)
 
 
 def moving(north: float = 0.0, east: float = 0.0, down: float = 0.0) -> Reported:
     return lambda at_s: (north * at_s, east * at_s, down * at_s)
+
+
+def rate_of(reported: Reported) -> Reported:
+    """Return the velocity of a position."""
+
+    def velocity(at_s: float) -> Vector | None:
+        now, then = reported(at_s), reported(at_s + 0.001)
+        if now is None or then is None:
+            return None
+        north, east, down = ((b - a) / 0.001 for a, b in zip(now, then, strict=True))
+        return north, east, down
+
+    return velocity
 
 
 def noticed(
@@ -37,16 +53,34 @@ def noticed(
     watch: ObedienceWatch | None = None,
     boot: Callable[[float], float] | None = None,
     silent: Callable[[float], bool] = lambda _at_s: False,
+    velocity: Reported | None = None,
+    noise_m: float = 0.0,
 ) -> tuple[float, str] | None:
-    """Return when the position was first doubted, and why."""
-    watch = watch or ObedienceWatch()
+    """Return when the position was first doubted, and why.
+
+    Args:
+        told: Velocity.
+        reported: Position.
+        until_s: End.
+        watch: One that may have seen something.
+        boot: The autopilot's clock.
+        silent: When no report comes.
+        velocity: Reported one, None: that of the reported position.
+        noise_m: Standard deviation, of the position.
+    """
+    watch, random = watch or ObedienceWatch(), Random(0)
     for step in range(round(until_s / STEP_S) + 1):
         at_s = step * STEP_S
         if silent(at_s):
             continue
         boot_ns = None if boot is None else round(boot(at_s) * 1e9)
-        watch.take(reported(at_s), round(at_s * 1e9), boot_ns)
-        watch.tell(told(at_s))
+        place, going = reported(at_s), (velocity or rate_of(reported))(at_s)
+        motion = None
+        if place is not None and going is not None:
+            north, east = (each + random.gauss(0.0, noise_m) for each in place[:2])
+            motion = ReportedMotion((north, east, place[2]), going[:2])
+        watch.take(motion, round(at_s * 1e9), boot_ns)
+        watch.tell(told(at_s), round(at_s * 1e9))
         if watch.problem:
             return at_s, watch.problem
     return None
@@ -145,7 +179,7 @@ def test_the_same_report_again_is_looked_at_once() -> None:
     assert noticed(steady(down=2.0), until_s=1.9375, watch=watch) is None
     count = len(watch._marks)
     for _ in range(5):
-        watch.take(frozen(0.0), round(1.9375e9))
+        watch.take(STANDING, round(1.9375e9))
     assert len(watch._marks) == count
 
 
@@ -160,7 +194,7 @@ def test_a_jump_begins_anew(jump_m: float, at_s: float) -> None:
 
 
 @pytest.mark.parametrize('turned', [0.0, 90.0, 200.0])
-@pytest.mark.parametrize(('speed', 'at_s'), [(1.0, 1.75), (0.5625, 2.5), (0.0, None)])
+@pytest.mark.parametrize(('speed', 'at_s'), [(1.0, 1.875), (0.5625, 2.625), (0.0, None)])
 def test_a_position_that_stands_still_exactly_is_noticed_after_a_metre(
     speed: float, at_s: float | None, turned: float
 ) -> None:
@@ -173,16 +207,7 @@ def test_a_position_that_stands_still_exactly_is_noticed_after_a_metre(
         assert 'not believed' in found[1]
 
 
-def noisy(reported: Told, size_m: float = 0.05, seed: int = 0) -> Reported:
-    random = Random(seed)
-
-    def told(at_s: float) -> Vector:
-        north, east, down = reported(at_s)
-        return north + random.gauss(0.0, size_m), east + random.gauss(0.0, size_m), down
-
-    return told
-
-
+@pytest.mark.parametrize('velocity_too', [True, False])
 @pytest.mark.parametrize('turned', [20.0, 70.0, 200.0])
 @pytest.mark.parametrize(
     ('gains', 'named'),
@@ -194,7 +219,7 @@ def noisy(reported: Told, size_m: float = 0.05, seed: int = 0) -> Reported:
     ],
 )
 def test_faulty_axes_are_named(
-    gains: tuple[float, float, float, float], named: str, turned: float
+    gains: tuple[float, float, float, float], named: str, turned: float, velocity_too: bool
 ) -> None:
     north, east = 2.5 * cos(radians(turned)), 2.5 * sin(radians(turned))
     went = (gains[0] * north + gains[1] * east, gains[2] * north + gains[3] * east)
@@ -207,41 +232,46 @@ def test_faulty_axes_are_named(
         way_s = max(0.0, at_s - begin_s - 0.6)
         return went[0] * way_s, went[1] * way_s, -50.0
 
-    found = noticed(told, noisy(reported))
+    def right(at_s: float) -> Vector:
+        way_s = max(0.0, at_s - begin_s - 0.6)
+        return north * way_s, east * way_s, -50.0
+
+    velocity = None if velocity_too else rate_of(right)
+    found = noticed(told, reported, velocity=velocity, noise_m=0.05)
     assert found is not None
-    assert found[0] - begin_s < 4.0
+    assert found[0] - begin_s < 2.0
     assert named in found[1]
-    right = noticed(
-        told,
-        noisy(
-            lambda at_s: (
-                north * max(0.0, at_s - begin_s - 0.6),
-                east * max(0.0, at_s - begin_s - 0.6),
-                -50.0,
-            )
-        ),
-    )
-    assert right is None
+    assert ('velocity does not follow what was told' in found[1]) == velocity_too
+    assert ('position does not follow the reported velocity' in found[1]) != velocity_too
+    assert noticed(told, right, noise_m=0.05) is None
 
 
-def test_a_vehicle_that_hardly_moves_for_its_bias_is_believed() -> None:
-    """Measured, PX4 v1.17-alpha: told to go 1.0 to 1.5 m in 2 s, it reports -0.2 to 0.1 m."""
+@pytest.mark.parametrize(('told_m_s', 'reported_m_s'), [(0.6, 0.6), (0.7, 0.45)])
+def test_a_vehicle_that_hardly_moves_for_its_bias_is_believed(
+    told_m_s: float, reported_m_s: float
+) -> None:
+    """Measured, PX4 v1.17-alpha: told 0.7 m/s it reports 0.45 m/s, and stays where it is."""
 
     def told(at_s: float) -> Vector:
-        return (0.6 if at_s >= 4.0 else 0.0, 0.0, 0.0)
+        return (told_m_s if at_s >= 4.0 else 0.0, 0.0, 0.0)
+
+    def velocity(at_s: float) -> Vector:
+        return (reported_m_s if at_s >= 4.5 else 0.0, 0.0, 0.0)
 
     def reported(at_s: float) -> Vector:
-        # A bias of 0.6 m/s to the south: it drifts, then stands.
-        return (-0.6 * min(at_s, 4.5), 0.0, -50.0)
+        # A bias as large as the speed: it drifts, then stands.
+        return (-reported_m_s * min(at_s, 4.5), 0.0, -50.0)
 
-    assert noticed(told, noisy(reported)) is None
+    assert noticed(told, reported, velocity=velocity, noise_m=0.05) is None
 
 
 @pytest.mark.parametrize('rate', [0.4, 1.0, 2.0])
 def test_the_way_is_that_of_the_clock_of_the_autopilot(rate: float) -> None:
     found = noticed(
         lambda _: (3.0, 0.0, 0.0),
-        noisy(lambda at_s: (3.0 * max(0.0, rate * at_s - 0.6), 0.0, -50.0)),
+        lambda at_s: (3.0 * max(0.0, rate * at_s - 0.6), 0.0, -50.0),
+        velocity=lambda at_s: (3.0 if rate * at_s >= 0.6 else 0.0, 0.0, 0.0),
+        noise_m=0.05,
         boot=lambda at_s: rate * at_s,
     )
     assert found is None
@@ -250,7 +280,8 @@ def test_the_way_is_that_of_the_clock_of_the_autopilot(rate: float) -> None:
 def test_a_fast_vehicle_that_is_rarely_reported_does_not_stand_still() -> None:
     found = noticed(
         steady(5.0),
-        noisy(lambda at_s: (5.0 * max(0.0, at_s - 1.0), 0.0, -50.0)),
+        lambda at_s: (5.0 * max(0.0, at_s - 1.0), 0.0, -50.0),
+        noise_m=0.05,
         silent=lambda at_s: at_s % 0.4375 != 0.0,
     )
     assert found is None
@@ -259,7 +290,8 @@ def test_a_fast_vehicle_that_is_rarely_reported_does_not_stand_still() -> None:
 def test_a_position_that_runs_away_is_noticed() -> None:
     found = noticed(
         lambda at_s: (1.0, 0.0, 0.0),
-        noisy(lambda at_s: (-0.3 * at_s, -2.5 * at_s, -50.0)),
+        lambda at_s: (-0.3 * at_s, -2.5 * at_s, -50.0),
+        noise_m=0.05,
     )
     assert found is not None
     assert found[0] < 6.0
@@ -277,9 +309,9 @@ def test_what_was_doubted_or_told_is_forgotten_when_asked() -> None:
     watch.forget()
     assert watch.problem == ''
     for step in range(100):
-        watch.take(frozen(0.0), round((20.0 + step * STEP_S) * 1e9))
+        watch.take(STANDING, round((20.0 + step * STEP_S) * 1e9))
     assert watch.problem == '', 'nothing was told since'
-    watch.tell((0.0, 0.0, 2.0))
+    watch.tell((0.0, 0.0, 2.0), round((20.0 + 99 * STEP_S) * 1e9))
     for step in range(100, 140):
-        watch.take(frozen(0.0), round((20.0 + step * STEP_S) * 1e9))
+        watch.take(STANDING, round((20.0 + step * STEP_S) * 1e9))
     assert watch.problem

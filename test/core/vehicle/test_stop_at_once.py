@@ -62,7 +62,7 @@ def test_telemetry_is_a_getter_and_the_reading_thread_finds_disobedience(flying,
     assert eventually(lambda: link.take_poses() != [])
     until = time.monotonic() + 5.0
     while not watch.problem and time.monotonic() < until:
-        link._obedience.tell((0.0, 0.0, 2.0))
+        link._obedience.tell((0.0, 0.0, 2.0), time.monotonic_ns())
         time.sleep(0.05)
     assert 'told to sink' in watch.problem, 'it was told to sink, and nobody sent it anything'
     assert 'told to sink' in link.telemetry().position_problem

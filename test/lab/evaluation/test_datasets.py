@@ -195,3 +195,19 @@ def test_drawn_scenes_are_the_same_each_time_and_vary_in_height() -> None:
     assert np.array_equal(image, again.samples[0].load()[0])
     assert labels.any()
     assert len(open_source(EvaluationInputs(drawn=9, limit=3)).samples) == 3
+
+
+def test_wide_frames_are_the_middle_of_the_square():
+    square, wide = (
+        open_source(EvaluationInputs(drawn=1, drawn_px=320, drawn_shape=shape)).samples[0].load()
+        for shape in ('1:1', '16:9')
+    )
+    assert wide[0].shape == (180, 320, 3)
+    np.testing.assert_array_equal(wide[0], square[0][70:250])
+    np.testing.assert_array_equal(wide[1], square[1][70:250])
+
+
+@pytest.mark.parametrize('shape', ['16', '9:16', '16:0', 'a:b', '5:1', 'nan:1'])
+def test_a_shape_is_width_to_height(shape):
+    with pytest.raises(DatasetError, match='--drawn-shape'):
+        open_source(EvaluationInputs(drawn=1, drawn_shape=shape))

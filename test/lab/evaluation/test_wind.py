@@ -24,14 +24,9 @@ def test_lands_over_the_island_in_wind_and_gusts():
     assert landed.worst_after_m > landed.error_m, 'gusts push after the hand-over too'
     states = {decision.state for *_, decision in flight.track}
     assert {State.LANDING, State.HANDOVER} <= states
-    island = [*_centre(flight)]
+    island = flight.island_m
     _, north, east, _ = flight.track[-1]
     assert hypot(north - island[0], east - island[1]) < wind.ISLAND_M - 1.5
-
-
-def _centre(flight):
-    rows, columns = (flight._ground > 0.5).nonzero()
-    return (0.5 * each.mean() - wind._HALF_M for each in (rows, columns))
 
 
 def test_a_guidance_that_overreacts_is_noticed(monkeypatch):

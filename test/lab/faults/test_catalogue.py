@@ -42,6 +42,9 @@ ASKED_FOR = {
     'autopilot reboots, refuses, changes mode': (
         'autopilot_reboots autopilot_refuses pilot_takes_over_landing'
     ),
+    'barometer steps and drifts': (
+        'barometer_steps_up barometer_steps_down barometer_drifts_up barometer_drifts_down'
+    ),
     'GNSS lost': 'gnss_lost gnss_lost_for_good gnss_lost_position_stale',
     'clock steps': (
         'clock_steps_forward clock_steps_back autopilot_clock_forward autopilot_clock_back'

@@ -4,16 +4,17 @@
 
 from __future__ import annotations
 
-from math import degrees
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from peace_ros.core.domain import RecordingError
+from peace_ros.core.domain import NADIR, Camera, RecordingError
+from peace_ros.core.domain.geometry import mount_from_degrees
 from peace_ros.lab.replay import SourceOptions, open_source
 from peace_ros.recording import BagWriter, VideoWriter
-from peace_ros.recording.messages import diagnostic_array, jpeg_message, pose_stamped
+from peace_ros.recording.bag import TYPESTORE
+from peace_ros.recording.messages import diagnostic_array, header, jpeg_message, pose_stamped
 
 SMALL = Path(__file__).resolve().parents[2] / 'data' / 'small.mcap'
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -46,7 +47,9 @@ def test_the_small_bag_holds_a_descent() -> None:
     frames = [taken.frame for taken in source.frames()]
     assert source.count == len(frames) == 45
     assert all(frame is not None and frame.image_rgb.shape == (352, 352, 3) for frame in frames)
-    assert degrees(source.fov_x_rad) == pytest.approx(73.0)
+    seen_by = frames[0].camera
+    assert seen_by.focal_xy_px[0] == pytest.approx(CAMERA_73.focal_px)
+    assert source.mount == NADIR
     altitudes = [pose.altitude_agl_m for pose in source.poses]
     assert altitudes[0] == pytest.approx(100.0)
     assert altitudes[-1] < 40.0
@@ -99,7 +102,8 @@ def test_a_pose_that_is_none_is_left_out_and_told(tmp_path) -> None:
             bag.write('/image', k * SECOND, jpeg_message(picture(9), k * SECOND))
     source = open_source(tmp_path / 'a.mcap', SourceOptions())
     assert [pose.stamp_ns for pose in source.poses] == [3 * SECOND, 4 * SECOND]
-    (remark,) = source.remarks
+    remark, assumed = source.remarks
+    assert 'field of view of 73 deg' in assumed
     assert remark.startswith('2 poses of /pose left out; the first: pose (0.0, 0.0, 50.0)')
 
 
@@ -122,7 +126,7 @@ def test_images_without_a_stamp_get_that_of_their_receipt(tmp_path) -> None:
     source = open_source(tmp_path / 'a.mcap', SourceOptions())
     taken = list(source.frames())
     assert [each.frame.stamp_ns for each in taken] == [k * SECOND for k in (1, 2, 3)]
-    assert source.remarks == [
+    assert source.remarks[:-1] == [
         'images of /image have the stamp 0: the time of their receipt is used'
     ]
 
@@ -152,7 +156,8 @@ def test_a_video_gets_a_camera_and_an_altitude(tmp_path) -> None:
             video.write(np.full((64, 64, 3), 20 * k, np.uint8))
     source = open_source(tmp_path / 'a.mp4', SourceOptions(fov_x_deg=60.0, altitude='80:30'))
     assert len(stamps(source)) == 11
-    assert degrees(source.fov_x_rad) == pytest.approx(60.0)
+    assert source.options.assumed_camera(64, 64) == Camera.from_degrees(64, 64, 60.0)
+    assert next(source.frames()).frame.camera is None
     assert [source.poses[k].altitude_agl_m for k in (0, 5, 10)] == pytest.approx([80, 55, 30])
     assert source.remarks == ['no altitude was recorded: 80:30 m is assumed, linear (--altitude)']
 
@@ -177,9 +182,123 @@ def test_a_bad_source_is_one_sentence(tmp_path, name) -> None:
         {'hz': float('nan')},
         {'limit': 0},
         {'fov_x_deg': 180.0},
+        {'mount_yaw_deg': 400.0},
         {'ground_m': float('nan')},
     ],
 )
 def test_senseless_parts_are_refused(given) -> None:
     with pytest.raises(RecordingError, match='give'):
         SourceOptions(**given)
+
+
+CAMERA_73 = Camera.from_degrees(352, 352, 73.0)
+T = TYPESTORE.types
+
+
+def info(focal_px: float, frame_id: str, size_px=(64, 48), d=()):
+    width, height = size_px
+    k = np.array([focal_px, 0, width / 2, 0, focal_px, height / 2, 0, 0, 1.0])
+    p = np.array([2 * focal_px, 0, width / 2, 0, 0, 2 * focal_px, height / 2, 0, 0, 0, 1.0, 0])
+    roi = T['sensor_msgs/msg/RegionOfInterest'](0, 0, 0, 0, False)
+    return T['sensor_msgs/msg/CameraInfo'](
+        header=header(1, frame_id),
+        height=height,
+        width=width,
+        distortion_model='plumb_bob',
+        d=np.array(d, float),
+        k=k,
+        r=np.eye(3).ravel(),
+        p=p,
+        binning_x=0,
+        binning_y=0,
+        roi=roi,
+    )
+
+
+def turned_tf(parent: str, child: str):
+    """The camera looks down, and the top of its picture points to the right."""
+    vector, quaternion = T['geometry_msgs/msg/Vector3'], T['geometry_msgs/msg/Quaternion']
+    transform = T['geometry_msgs/msg/Transform'](
+        vector(0.1, 0.0, 0.0), quaternion(0.0, 1.0, 0.0, 0.0)
+    )
+    stamped = T['geometry_msgs/msg/TransformStamped'](header(1, parent), child, transform)
+    return T['tf2_msgs/msg/TFMessage'](transforms=[stamped])
+
+
+def bag_with(path: Path, image_topic: str, extra) -> Path:
+    """Return a bag of one image (64 x 48, frame_id optical) and other messages by topic."""
+    with BagWriter(path) as bag:
+        for topic, message in extra:
+            bag.write(topic, 1, message)
+        bag.write('/pose', SECOND, pose_stamped(SECOND, (0, 0, 50), LEVEL))
+        image = jpeg_message(np.full((48, 64, 3), 90, np.uint8), SECOND)
+        image.header.frame_id = 'optical'
+        bag.write(image_topic, SECOND, image)
+    return path
+
+
+def camera_of(path: Path, **given):
+    (taken,) = open_source(path, SourceOptions(**given)).frames()
+    assert taken.frame is not None, taken.fault
+    return taken.frame.camera
+
+
+def test_the_calibration_is_that_beside_the_image(tmp_path) -> None:
+    extra = [('/aux/camera_info', info(999.0, 'optical')), ('/belly/camera_info', info(80.0, 'b'))]
+    path = bag_with(tmp_path / 'a.mcap', '/belly/image_raw/compressed', extra)
+    assert camera_of(path).focal_px == 80.0
+    assert camera_of(path, fov_x_deg=60.0) is None
+
+
+def test_else_it_is_the_one_of_the_same_frame_id(tmp_path) -> None:
+    extra = [
+        ('/aux/camera_info', info(999.0, 'aux')),
+        ('/other/camera_info', info(70.0, 'optical')),
+    ]
+    path = bag_with(tmp_path / 'a.mcap', '/belly/image_raw/compressed', extra)
+    assert camera_of(path).focal_px == 70.0
+
+
+def test_the_calibrations_of_other_cameras_are_not_used(tmp_path) -> None:
+    path = bag_with(
+        tmp_path / 'a.mcap', '/b/image/compressed', [('/c/camera_info', info(9.0, 'c'))]
+    )
+    with pytest.raises(RecordingError, match=r'none of /c/camera_info is beside .* give --fov'):
+        open_source(path, SourceOptions())
+    assert camera_of(path, fov_x_deg=60.0) is None
+
+
+def test_a_rectified_image_has_no_distortion(tmp_path) -> None:
+    bent = info(80.0, 'optical', d=(-0.1, 0.01, 0.0, 0.0, 0.0))
+    raw = bag_with(tmp_path / 'a.mcap', '/b/image_raw/compressed', [('/b/camera_info', bent)])
+    assert camera_of(raw).distortion.coefficients[0] == -0.1
+    flat = bag_with(tmp_path / 'b.mcap', '/b/image_rect/compressed', [('/b/camera_info', bent)])
+    assert camera_of(flat).distortion is None
+    assert camera_of(flat).focal_px == 160.0
+
+
+def test_a_calibration_that_cannot_be_used_is_told(tmp_path) -> None:
+    never = bag_with(
+        tmp_path / 'a.mcap', '/b/image/compressed', [('/b/camera_info', info(0.0, 'o'))]
+    )
+    with pytest.raises(RecordingError, match=r'not calibrated: give --fov'):
+        open_source(never, SourceOptions())
+    other = info(80.0, 'o', (640, 480))
+    path = bag_with(tmp_path / 'b.mcap', '/b/image/compressed', [('/b/camera_info', other)])
+    (taken,) = open_source(path, SourceOptions()).frames()
+    assert taken.frame is None
+    assert '640 x 480 px, the image has 64 x 48 px' in taken.fault
+
+
+def test_the_mount_is_that_of_tf_static_unless_it_is_given(tmp_path) -> None:
+    extra = [('/tf_static', turned_tf('base_link', 'optical'))]
+    path = bag_with(tmp_path / 'a.mcap', '/image/compressed', extra)
+    mount = open_source(path, SourceOptions()).mount
+    turned = mount_from_degrees((0.0, 0.0, 90.0), (0.1, 0.0, 0.0))
+    assert mount.quaternion == pytest.approx(turned.quaternion)
+    assert mount.offset_frd_m == turned.offset_frd_m
+    given = open_source(path, SourceOptions(mount_yaw_deg=180.0)).mount
+    assert given == mount_from_degrees((0.0, 0.0, 180.0), (0.0, 0.0, 0.0))
+    elsewhere = [('/tf_static', turned_tf('base_link', 'another'))]
+    other = bag_with(tmp_path / 'b.mcap', '/image/compressed', elsewhere)
+    assert open_source(other, SourceOptions()).mount == NADIR

@@ -4,6 +4,7 @@
 
 import math
 import socket
+from itertools import pairwise
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -90,6 +91,42 @@ def test_altitude_is_distorted_until_cleared(sim, ear, arguments, down):
     assert ear.position().z == pytest.approx(down, abs=0.3, nan_ok=True)
     inject(sim, 'clear')
     assert ear.position().z == pytest.approx(-12.0, abs=0.3)
+
+
+@pytest.mark.parametrize('error_m', [6.0, -6.0])
+def test_a_barometer_that_steps_takes_the_vehicle_along(sim, ear, error_m):
+    inject(sim, 'barometer', error_m=error_m)
+    told = [m.z for m in ear.of('LOCAL_POSITION_NED', 2.0)]
+    assert max(abs(b - a) for a, b in pairwise(told)) < 0.5, 'no jump'
+    assert 1.0 < abs(sim.truth().altitude_agl_m - 12.0) < 5.5, 'it glides'
+    sim.step(12.0)
+    assert ear.position().z == pytest.approx(-12.0, abs=0.4), 'it holds what it estimates'
+    assert sim.truth().altitude_agl_m == pytest.approx(12.0 - error_m, abs=0.4)
+    inject(sim, 'clear')
+    sim.step(15.0)
+    assert sim.truth().altitude_agl_m == pytest.approx(12.0, abs=0.4)
+
+
+def test_a_barometer_drifts(sim):
+    inject(sim, 'barometer', error_m=4.0, rate_m_s=0.5)
+    sim.step(4.0)
+    assert 0.5 < sim.flight.barometer.height_m < 2.0
+    sim.step(20.0)
+    assert sim.flight.barometer.height_m == pytest.approx(4.0, abs=0.1)
+    for wrong in ({'error_m': math.nan}, {'rate_m_s': 0.0}):
+        with pytest.raises(VehicleError, match='must be finite'):
+            inject(sim, 'barometer', **wrong)
+
+
+def test_gnss_knows_nothing_of_the_barometer(sim, ear):
+    ear.command(511, 24, 200_000)
+    before = ear.of('GPS_RAW_INT')[-1]
+    assert before.v_acc == 2500
+    inject(sim, 'barometer', error_m=6.0)
+    sim.step(12.0)
+    after = ear.of('GPS_RAW_INT')[-1]
+    fell_m = (before.alt - after.alt) / 1e3
+    assert fell_m == pytest.approx(6.0, abs=4.0), 'with the noise of 12 s'
 
 
 @pytest.mark.parametrize(

@@ -137,7 +137,7 @@ def test_a_run_that_never_began_still_has_a_summary(tmp_path) -> None:
     summary = summarise(History(), Ending('error', 'no node', None), SETTING, truth(meadow()))
     assert summary.frames == 0
     assert summary.altitude_agl_m is None
-    assert draw_pictures(History(), summary, truth(meadow()), CAMERA, tmp_path) == []
+    assert draw_pictures(History(), summary, truth(meadow()), tmp_path) == []
 
 
 def test_the_json_holds_what_the_issue_of_a_run_needs(tmp_path) -> None:
@@ -179,7 +179,7 @@ def test_pictures_are_drawn_from_the_history(tmp_path) -> None:
     world = truth(meadow())
     history = history_of_a_landing()
     summary = summarise(history, Ending('handover', 'done', 50 * SECOND), SETTING, world)
-    written = draw_pictures(history, summary, world, CAMERA, tmp_path)
+    written = draw_pictures(history, summary, world, tmp_path)
     assert [path.name for path in written] == ['trajectory.png', 'filmstrip.png']
     assert all(path.stat().st_size > 5000 for path in written)
 

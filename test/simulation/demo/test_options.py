@@ -38,7 +38,16 @@ def photo(tmp_path) -> Path:
         ({'speed': float('nan')}, '--speed'),
         ({'timeout_s': 1.0}, '--timeout'),
         ({'seed': -1}, '--seed'),
-        ({'camera_px': 8}, '--camera-px'),
+        ({'camera_size': '8x352'}, '--camera 8x352: give 64 to 4096'),
+        ({'camera_size': '640'}, 'give WxH'),
+        ({'camera_size': '640x-360'}, 'give WxH'),
+        ({'camera_size': 'x'}, 'give WxH'),
+        ({'distortion': '0.1,x'}, '--distortion'),
+        ({'distortion': '0.1,0.2'}, '4 or 5 finite numbers'),
+        ({'distortion': 'orthographic:0.1'}, 'orthographic'),
+        ({'distortion': '0.1,nan,0,0'}, 'finite'),
+        ({'mount_pitch_deg': 95.0}, 'mount_pitch'),
+        ({'fov_deg': 200.0}, 'camera_fov'),
         ({'mavlink': 'udpin:127.0.0.1:1'}, '--pose-mavlink'),
         ({'pose_mavlink': 'udpin:127.0.0.1:1'}, '--mavlink'),
         ({'mavlink': 'udpin:127.0.0.1:1', 'pose_mavlink': 'udpin:127.0.0.1:1'}, 'second'),
@@ -143,7 +152,8 @@ def wiring(tmp_path, photo, **changes) -> Wiring:
     prepared = prepare_world(DemoOptions(world=photo, gsd_m=0.5, start='1,2'), tmp_path)
     plain = {
         'world': prepared,
-        'camera_px': 704,
+        'camera': DemoOptions(camera_size='704x396', mount_pitch_deg=15.0).camera_options,
+        'lens': None,
         'preset': tmp_path / 'preset.yaml',
         'speed': 2.0,
         'mavlink': 'udpout:127.0.0.1:5',
@@ -162,10 +172,21 @@ def test_with_our_own_autopilot_five_nodes_share_its_clock(tmp_path, photo) -> N
     assert 'speed:=2.0' in arguments['autopilot_sim']
     assert {'start_x:=1.0', 'start_y:=2.0', 'gsd:=0.5'} <= set(arguments['satellite_view'])
     assert "mavlink:='udpout:127.0.0.1:5'" in arguments['landing']
+    assert {'camera_width:=704', 'camera_height:=396'} <= set(arguments['satellite_view'])
+    assert not [each for each in arguments['landing'] if each.startswith('camera_')]
     for name in ('satellite_view', 'landing'):
-        assert {'camera_width:=704', 'camera_height:=704'} <= set(arguments[name])
+        assert 'mount_pitch:=15.0' in arguments[name]
     for name in ('prompt_generator', 'segmentation', 'landing'):
         assert str(tmp_path / 'preset.yaml') in arguments[name]
+
+
+def test_a_lens_reaches_the_simulated_camera_only(tmp_path, photo) -> None:
+    lens = DemoOptions(distortion='equidistant:0.05,-0.01,0.002,-0.001').lens
+    arguments = node_arguments(wiring(tmp_path, photo, lens=lens))
+    assert "distortion_model:='equidistant'" in arguments['satellite_view']
+    assert 'distortion:=[0.05, -0.01, 0.002, -0.001]' in arguments['satellite_view']
+    assert 'distortion' not in ' '.join(arguments['landing'])
+    assert DemoOptions(distortion='-0.2,0.04,0,0').lens.model == 'plumb_bob'
 
 
 def test_a_given_autopilot_replaces_ours_and_leads_the_camera(tmp_path, photo) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import pytest
 
 from peace_ros.core import messages as readers
-from peace_ros.core.domain import Camera, Pose
+from peace_ros.core.domain import Pose
 from peace_ros.core.domain.geometry import quaternion_from_euler
 
 pytest.importorskip('rclpy')
@@ -22,11 +22,3 @@ def test_a_transform_is_read_as_a_pose():
     transform = messages.transform_from_pose(pose, 'flying_sensor')
     assert (transform.header.frame_id, transform.child_frame_id) == ('map', 'flying_sensor')
     assert readers.pose_from_transform(transform).north_m == pytest.approx(5.0)
-
-
-def test_camera_info_holds_the_focal_length():
-    camera = Camera.from_degrees(352, 352, 73.0)
-    info = messages.camera_info(camera, STAMP)
-    assert (info.width, info.height) == (352, 352)
-    assert info.k[0] == pytest.approx(camera.focal_px)
-    assert info.k[2] == 175.5

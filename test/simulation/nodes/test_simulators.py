@@ -141,6 +141,35 @@ def test_the_pose_of_a_signing_autopilot_needs_its_key(bench, world, tmp_path, c
     assert (tmp_path / 'key.254.time').is_file()
 
 
+def test_the_camera_says_after_3_s_why_it_shows_nothing(bench, world, capfd):
+    said = ''
+
+    def hears(*words):
+        nonlocal said
+        said += capfd.readouterr().err
+        return all(word in said for word in words)
+
+    with AutopilotSim(AutopilotParameters(port=0, speed=1.0)) as sim:
+        sim.lose_gps()
+        bench.run(SatelliteViewNode, world=world, gsd=0.5, pose_mavlink=sim.url)
+        bench.until(
+            lambda: hears(
+                'waiting for the camera: the autopilot tells no position because',
+                'it needs GNSS (fix type',
+            )
+        )
+    bench.run(SatelliteViewNode, world=world, gsd=0.5)
+    bench.until(lambda: hears('nothing publishes ground_truth/pose'))
+
+
+def test_a_px4_at_rest_has_a_position_and_the_camera_shows_the_ground(bench, world):
+    images = bench.heard(Image, 'image', qos.IMAGE_IN)
+    with AutopilotSim(AutopilotParameters(port=0, speed=25.0, autopilot='px4')) as sim:
+        bench.run(SatelliteViewNode, world=world, gsd=0.5, pose_mavlink=sim.url)
+        bench.until(lambda: bool(images))
+        assert sim.flight.landed
+
+
 def test_a_world_that_is_missing_is_refused(bench):
     with pytest.raises(WorldError, match=r'none\.png'):
         bench.run(SatelliteViewNode, world='/none.png', gsd=0.5)

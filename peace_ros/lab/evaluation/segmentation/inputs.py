@@ -24,6 +24,7 @@ from peace_ros.lab.evaluation.segmentation.samples import (
 )
 
 _DATASET = f'One of {", ".join(dataset_names())}; needs --root.'
+_WIDEST = 4.0
 _MIXED = f'Classes of safe and unsafe ground alike: {", ".join(MIXED)}.'
 
 
@@ -51,6 +52,9 @@ class EvaluationInputs:
     drawn_px: Annotated[
         int, Option(metavar='N', min=64, max=4096, help='Side of the camera that sees the scenes.')
     ] = CAMERA_PX
+    drawn_shape: Annotated[
+        str, Option(metavar='W:H', help='Shape of its frames, at least 1:1: their middle is kept.')
+    ] = '1:1'
     classes: Annotated[
         str, Option(metavar='NAME|FILE', help='Class table of --labels and --manifest.')
     ] = 'common'
@@ -83,6 +87,21 @@ def open_source(inputs: EvaluationInputs) -> SampleSource:
     return sampled(_open(inputs), inputs.limit)
 
 
+def parse_shape(text: str) -> float:
+    """Return width over height of ``W:H``.
+
+    Raises DatasetError for anything else, and for frames that are higher than wide.
+    """
+    width, colon, height = text.partition(':')
+    try:
+        shape = float(width) / float(height)
+    except (ValueError, ZeroDivisionError):
+        shape = 0.0
+    if not colon or not 1.0 <= shape <= _WIDEST:
+        raise DatasetError(f'--drawn-shape {text}: give W:H from 1:1 to {_WIDEST:g}:1, e.g. 16:9')
+    return shape
+
+
 def _open(inputs: EvaluationInputs) -> SampleSource:
     if inputs.dataset:
         if inputs.root is None:
@@ -95,4 +114,4 @@ def _open(inputs: EvaluationInputs) -> SampleSource:
             raise DatasetError(f'--images {inputs.images} without --labels: give their folder')
         return folder_source(inputs.images, inputs.labels, inputs.classes, inputs.mixed)
     first_seed = DRAWN_SEED if inputs.drawn_seed is None else inputs.drawn_seed
-    return drawn_source(inputs.drawn, first_seed, inputs.drawn_px)
+    return drawn_source(inputs.drawn, first_seed, inputs.drawn_px, parse_shape(inputs.drawn_shape))

@@ -120,6 +120,8 @@ class DrawnSample:
     seed: int
     camera_px: int = CAMERA_PX
     """Most pixels on a side."""
+    shape: float = 1.0
+    """Width over height; wide frames are the middle rows of the square."""
 
     @property
     def name(self) -> str:
@@ -138,18 +140,21 @@ class DrawnSample:
         extent_m = 2.0 * self.height_m * np.tan(np.radians(FOV_DEG / 2.0))
         side_px = min(self.camera_px, int(extent_m / FINEST_M))
         scene = draw_scene(self.seed, side_px, float(extent_m / side_px))
-        return scene.image_rgb, scene.labels
+        rows = round(side_px / self.shape)
+        middle = slice((side_px - rows) // 2, (side_px - rows) // 2 + rows)
+        return np.ascontiguousarray(scene.image_rgb[middle]), scene.labels[middle]
 
 
 def drawn_source(
-    count: int, first_seed: int = DRAWN_SEED, camera_px: int = CAMERA_PX
+    count: int, first_seed: int = DRAWN_SEED, camera_px: int = CAMERA_PX, shape: float = 1.0
 ) -> SampleSource:
-    """Return scenes that no training has seen, as a square camera of so many pixels sees them."""
+    """Return scenes that no training has seen, as a camera so many pixels wide sees them."""
     seeds = range(first_seed, first_seed + count)
     low, high = HEIGHTS_M
     return SampleSource(
-        f'{count} drawn scenes, seeds {first_seed} on, from {low:g} to {high:g} m, {camera_px} px',
-        tuple(DrawnSample(seed, camera_px) for seed in seeds),
+        f'{count} drawn scenes, seeds {first_seed} on, from {low:g} to {high:g} m, '
+        f'{camera_px} px, {shape:.3g} : 1',
+        tuple(DrawnSample(seed, camera_px, shape) for seed in seeds),
     )
 
 

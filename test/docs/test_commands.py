@@ -1,0 +1,261 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every command of the pages is possible: its verb, options, files, arguments and extras exist.
+
+Those that are quick are run. The others stand in tables here with the reason why they are not.
+"""
+
+from __future__ import annotations
+
+import ast
+import configparser
+import importlib
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+import typer
+
+from peace_ros.cli import main as command_line
+from peace_ros.cli.options import for_typer
+from peace_ros.core.node_parameters import FLYING_NODES, SIMULATOR_NODES, named
+from peace_ros.core.presets import preset_names
+from peace_ros.lab.parameter_docs import NODE_PARAMETERS
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = (
+    *(ROOT / name for name in ('README.md', 'models/README.md', '.github/CONTRIBUTING.md')),
+    *sorted((ROOT / 'docs').glob('**/*.md')),
+)
+QUICK = (
+    'peace --help',
+    'peace models list',
+    'peace doctor',
+    'peace models warm --size 352x352',
+    'ros2 run peace_ros peace models warm',
+)
+"""Run as they stand (``ros2 run peace_ros peace`` as ``peace``), each must end with status 0."""
+NOT_RUN = {
+    'peace': 'flies, measures for minutes, or needs data, hardware or a download; see QUICK',
+    'ros2': 'ros2cli has no wheels; verbs, parameters and arguments are checked',
+    'python': 'takes minutes; the module is checked',
+    'pip': 'changes the environment; extras are checked',
+    'launch_scripts/demo.sh': 'a flight of minutes: test/simulation/demo flies it',
+    'launch_scripts/test.sh': 'runs this test',
+    '.ci/run': 'runs this test',
+    '.ci/ubuntu-24.04': 'installs packages',
+    '.venv/bin/peace': 'as peace',
+    'docker': 'no Docker where the tests run; test_deployment.py checks the images',
+    'sudo': 'changes the machine',
+    'journalctl': 'reads the log of the units',
+    'git': 'a download',
+    './build.sh': 'builds ONNX Runtime, on a Jetson',
+    'rosdep': 'needs a ROS installation',
+    'colcon': 'needs a ROS installation',
+    'mkdocs': 'test_pages.py builds the site',
+    'cd': 'changes the folder',
+    'source': 'changes the shell',
+    'export': 'changes the shell',
+    'findings/openvino_nan.sh': 'shows a defect of another project; takes a download',
+}
+"""First word of a command -> why it is not run."""
+FILE = re.compile(r'(?:\./)?((?:launch_scripts|docs|config|models|test|findings|\.ci)/[\w./@-]+)')
+
+
+class Command(NamedTuple):
+    page: str
+    words: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f'{self.page}: {" ".join(self.words)}'
+
+
+def _lines(text: str) -> Iterator[tuple[str, bool]]:
+    """Yield lines of code of a page, joined where they go on, and whether they are of a shell."""
+    text = re.sub(r'\\\n\s*', ' ', text)
+    kind, is_open = '', False
+    for line in text.splitlines():
+        if line.startswith('```'):
+            is_open = not is_open
+            kind = line.removeprefix('```').strip() if is_open else ''
+        elif is_open and kind == 'sh':
+            yield line, True
+        elif not is_open and line.startswith('    '):
+            yield line, False
+        elif not is_open:
+            yield from ((each, False) for each in re.findall(r'`((?:peace|ros2) [^`]+)`', line))
+
+
+def _commands() -> list[Command]:
+    found = []
+    for page in PAGES:
+        for line, is_shell in _lines(page.read_text()):
+            for part in re.split(r'&&|\|', line):
+                try:
+                    words = shlex.split(part, comments=True)
+                except ValueError:
+                    assert not is_shell, f'{page}: {part}'
+                    continue
+                while words and re.fullmatch(r'[A-Z_]+=\S*', words[0]):
+                    words.pop(0)
+                if words and (is_shell or words[0] in NOT_RUN):
+                    found.append(Command(page.name, tuple(words)))
+    return found
+
+
+COMMANDS = _commands()
+
+
+def _of_peace(words: tuple[str, ...]) -> tuple[str, ...] | None:
+    """Return what follows ``peace`` where a command runs it, also in ROS or a container."""
+    if Path(words[0]).name == 'peace' or words[0] == 'launch_scripts/demo.sh':
+        return words[1:] if Path(words[0]).name == 'peace' else ('demo', *words[1:])
+    for index in range(len(words) - 2):
+        if words[index : index + 3] == ('run', 'peace_ros', 'peace'):
+            return words[index + 3 :]
+    return None
+
+
+def _launch_arguments() -> set[str]:
+    tree = ast.parse((ROOT / 'launch_scripts/landing.launch.py').read_text())
+    declared = {
+        row.elts[0].value
+        for node in ast.walk(tree)
+        if re.match(r'ARGUMENTS\b', ast.unparse(node)) and isinstance(node, ast.stmt)
+        for row in ast.walk(node)
+        if isinstance(row, ast.Tuple) and row.elts and isinstance(row.elts[0], ast.Constant)
+    }
+    return declared | {
+        node.args[0].value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func).endswith('DeclareLaunchArgument')
+        and node.args
+        and isinstance(node.args[0], ast.Constant)
+    }
+
+
+def _options_of(words: tuple[str, ...]) -> tuple[set[str], int]:
+    """Return the options of a verb, and how many words its name has."""
+    if words[:1] == ('models',) and len(words) > 1:
+        assert words[1] in command_line.MODEL_VERBS, words
+        module, function, count = 'models', f'models_{words[1]}', 2
+    else:
+        assert words[0] in command_line.VERBS, words
+        module, function, count = words[0], words[0], 1
+    verb = getattr(importlib.import_module(f'peace_ros.cli.{module}'), function)
+    own = typer.Typer()
+    own.command()(for_typer(verb))
+    options = typer.main.get_command(own).params
+    return {name for each in options for name in (*each.opts, *each.secondary_opts)}, count
+
+
+def _check_peace(words: tuple[str, ...]) -> None:
+    if not words or words[0] in {'--help', '--version'} or not re.match(r'[a-z]', words[0]):
+        return
+    if words == ('models',):
+        return
+    options, count = _options_of(words)
+    for word in words[count:]:
+        if word.startswith('--') and word != '--help':
+            assert word.partition('=')[0] in options, word
+    if '--config' in words[:-1]:
+        preset = words[words.index('--config') + 1]
+        names = {*preset_names(), 'all', 'PRESET', 'own'}
+        assert preset in names or preset.endswith('.yaml'), preset
+
+
+def _check_ros(words: tuple[str, ...]) -> None:
+    if words[1:3] == ('run', 'peace_ros') and words[3] != 'peace':
+        assert words[3] in (*FLYING_NODES, *SIMULATOR_NODES)
+        known = named(NODE_PARAMETERS[words[3]])
+        for option, value in pairwise(words):
+            if option == '-p':
+                name = value.partition(':=')[0]
+                assert name in known or name == 'use_sim_time', value
+    elif words[1:3] == ('launch', 'peace_ros'):
+        assert words[3] == 'landing.launch.py'
+        for word in words[4:]:
+            assert word.startswith('-') or word.partition(':=')[0] in _launch_arguments(), word
+    elif words[1:3] == ('service', 'call'):
+        assert words[3].rpartition('/')[2] in {'engage', 'disengage'}
+
+
+def _check_extras(words: tuple[str, ...]) -> None:
+    config = configparser.ConfigParser()
+    config.read(ROOT / 'setup.cfg')
+    for word in words:
+        for extras in re.findall(r'(?:\.|peace_ros)\[([\w,]+)\]', word):
+            assert set(extras.split(',')) <= set(config['options.extras_require']), word
+
+
+def test_the_pages_have_commands_of_each_kind() -> None:
+    assert len(COMMANDS) > 80
+    assert {each.words[0] for each in COMMANDS} >= {'peace', 'ros2', 'pip', 'docker', 'sudo'}
+    assert sum(_of_peace(each.words) is not None for each in COMMANDS) > 40
+
+
+@pytest.mark.parametrize('command', COMMANDS, ids=str)
+def test_a_command_is_possible(command: Command) -> None:
+    words = command.words
+    is_ours = Path(words[0]).name == 'peace'
+    assert is_ours or words[0] in NOT_RUN, f'{command}: say in NOT_RUN why it is not run'
+    given = _of_peace(words)
+    if given is not None:
+        _check_peace(given)
+    elif words[0] == 'ros2':
+        _check_ros(words)
+    elif words[:2] == ('python', '-m') and words[2].startswith('peace_ros'):
+        path = ROOT / Path(*words[2].split('.'))
+        assert path.with_suffix('.py').is_file() or (path / '__main__.py').is_file()
+    elif words[0] == 'pip':
+        _check_extras(words)
+    for word in words:
+        for file in FILE.findall(word):
+            assert (ROOT / file).exists(), word
+
+
+def test_impossible_commands_are_found() -> None:
+    for words in (('fly',), ('demo', '--altitude'), ('models', 'burn'), ('demo', '--config', 'x')):
+        with pytest.raises(AssertionError):
+            _check_peace(words)
+    for words in (
+        ('ros2', 'run', 'peace_ros', 'landin'),
+        ('ros2', 'run', 'peace_ros', 'landing', '--ros-args', '-p', 'heigth:=3'),
+        ('ros2', 'launch', 'peace_ros', 'landing.launch.py', 'mavlnk:=x'),
+    ):
+        with pytest.raises(AssertionError):
+            _check_ros(words)
+    with pytest.raises(AssertionError):
+        _check_extras(('pip', 'install', '.[no_such]'))
+
+
+@pytest.mark.parametrize('line', QUICK)
+def test_a_quick_command_of_the_pages_works(line: str, tmp_path: Path) -> None:
+    words = tuple(shlex.split(line))
+    stands = any(each.words[: len(words)] == words for each in COMMANDS)
+    assert stands or any(words == each.words[-len(words) :] for each in COMMANDS), line
+    given = _of_peace(words)
+    assert given is not None
+    done = subprocess.run(
+        [sys.executable, '-m', 'peace_ros.cli.main', *given],
+        cwd=tmp_path,
+        env={
+            **os.environ,
+            'PYTHONPATH': str(ROOT),
+            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+            'ROS_DOMAIN_ID': str(101 + os.getpid() % 100),
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
