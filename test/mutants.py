@@ -57,7 +57,7 @@ GROUPS = {
     'states': Group(['core/landing/states.py'], ['core/landing/test_states.py']),
     'core': Group(['core/landing/core.py'], ['core/landing/test_core.py']),
     'vehicle': Group(
-        ['core/vehicle/sender.py', 'core/vehicle/obedience.py'],
+        ['core/vehicle/sender.py', 'core/vehicle/obedience.py', 'core/vehicle/faulty_axes.py'],
         [
             'core/vehicle/test_sender.py',
             'core/vehicle/test_sender_limits.py',
@@ -199,13 +199,14 @@ def _concerns_types_only(copy: Path, module: str, mutant: str, code: int | None)
 
 
 def table() -> None:
-    """Print a table per module, then the mutants that survived."""
+    """Print a table by module and group, then the mutants that survived."""
     from mutmut.stats import status_by_exit_code
 
     total: Counter[str] = Counter()
     survivors = []
     print('| module | mutants | killed | survived | share | not run |\n|---|---|---|---|---|---|')
     for copy in map(COPIES.joinpath, GROUPS):
+        group: Counter[str] = Counter()
         for module, path in _results(copy).items():
             counts: Counter[str] = Counter()
             codes = json.loads(path.read_text(encoding='utf-8'))['exit_code_by_key']
@@ -217,9 +218,12 @@ def table() -> None:
                 elif status in LEFT or status == 'skipped':
                     continue
                 counts[status] += 1
-            total += counts
+            group += counts
             if counts:
                 print(_row(f'`{module}`', counts))
+        total += group
+        if group:
+            print(_row(f'group {copy.name}', group))
     print(_row('all', total))
     print('\n'.join(survivors))
 

@@ -9,7 +9,7 @@ measured), it drifts, and comes to rest beside the site: by bias / gain.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import exp, hypot
+from math import exp, hypot, inf
 
 from peace_ros.core.domain import Pose, Setpoint
 
@@ -47,7 +47,7 @@ class Drift:
         if pose.stamp_ns == self._stamp_ns:
             return
         place = (pose.north_m, pose.east_m)
-        seconds = -1.0 if self._stamp_ns is None else (pose.stamp_ns - self._stamp_ns) * 1e-9
+        seconds = inf if self._stamp_ns is None else (pose.stamp_ns - self._stamp_ns) * 1e-9
         self._stamp_ns = pose.stamp_ns
         away = hypot(place[0] - self._place[0], place[1] - self._place[1])
         if not 0.0 < seconds <= _GAP_S or away > _STEP_M:
@@ -57,8 +57,7 @@ class Drift:
         north = self._learned(0, told.v_north_m_s, place[0], seconds)
         east = self._learned(1, told.v_east_m_s, place[1], seconds)
         self._going, self._place, drift = zip(north, east, strict=True)
-        size = hypot(*drift)
-        scale = min(1.0, LIMIT_M_S / size) if size > 0.0 else 1.0
+        scale = LIMIT_M_S / max(LIMIT_M_S, hypot(*drift))
         self.velocity_m_s = (drift[0] * scale, drift[1] * scale)
 
     def _learned(
@@ -85,7 +84,6 @@ class Drift:
         share = 1.0 - IGNORED_M_S / drift
         north = wish.v_north_m_s - share * self.velocity_m_s[0]
         east = wish.v_east_m_s - share * self.velocity_m_s[1]
-        size = hypot(north, east)
         limit = max(limit_m_s, lateral)
-        scale = min(1.0, limit / size) if size > 0.0 else 1.0
+        scale = limit / max(limit, hypot(north, east))
         return replace(wish, v_north_m_s=scale * north, v_east_m_s=scale * east)

@@ -9,7 +9,7 @@ never becomes a descent, and the most restrictive limit wins.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import hypot, isfinite
+from math import copysign, hypot, isfinite
 
 from peace_ros.core.domain import Setpoint
 from peace_ros.core.landing.parameters import CELL_SCORE_FLOOR, LandingParameters
@@ -77,16 +77,16 @@ class Guard:
         return replace(wish, v_down_m_s=0.0), f'descent stopped: {problem}'
 
     def _floor(self, wish: Setpoint, given: Situation) -> tuple[Setpoint, str]:
-        if wish.v_down_m_s <= 0.0 or given.pose is None:
+        if given.pose is None:
             return wish, ''
         height_m = given.pose.altitude_agl_m - given.above_lowest_m
-        room_m = max(0.0, height_m - self._p.handover_altitude_m)
-        down = min(wish.v_down_m_s, room_m / _REACTION_S)
+        room_m = height_m - self._p.handover_altitude_m
+        down = min(wish.v_down_m_s, _slow_enough(room_m, _REACTION_S))
         return replace(wish, v_down_m_s=down), 'descent limited: the floor is near'
 
     def _speed(self, wish: Setpoint, _given: Situation) -> tuple[Setpoint, str]:
-        lateral = hypot(wish.v_north_m_s, wish.v_east_m_s)
-        scale = min(1.0, self._p.lateral_speed_limit / lateral) if lateral > 0.0 else 1.0
+        limit = self._p.lateral_speed_limit
+        scale = limit / max(limit, hypot(wish.v_north_m_s, wish.v_east_m_s))
         down = min(self._p.z_speed_landing, max(-self._p.z_speed_climbing, wish.v_down_m_s))
         return (
             Setpoint(wish.stamp_ns, wish.v_north_m_s * scale, wish.v_east_m_s * scale, down),
@@ -102,7 +102,7 @@ class Guard:
         outward = 0.0
         if distance > 0.0:
             outward = (wish.v_north_m_s * north + wish.v_east_m_s * east) / distance
-        allowed = max(0.0, (radius - distance) / _FENCE_REACTION_S)
+        allowed = _slow_enough(radius - distance, _FENCE_REACTION_S)
         if outward <= allowed:
             return wish, ''
         # Both components shrink: the direction stays.
@@ -131,9 +131,12 @@ def _finite(wish: Setpoint, _given: Situation) -> tuple[Setpoint, str]:
     return Setpoint(wish.stamp_ns), 'stopped: the set-point was not finite'
 
 
+def _slow_enough(room_m: float, reaction_s: float) -> float:
+    """Return the highest speed towards a limit that is ``room_m`` away, 0 beyond it."""
+    return max(0.0, room_m / reaction_s)
+
+
 def _grown(last: float, wish: float, room: float) -> float:
     """Return the wish, at most ``room`` farther from zero than the last; stops are at once."""
-    start = last if last * wish > 0.0 else 0.0
-    if wish >= 0.0:
-        return min(wish, start + room)
-    return max(wish, start - room)
+    start = abs(last) if last * wish > 0.0 else 0.0
+    return copysign(min(abs(wish), start + room), wish)

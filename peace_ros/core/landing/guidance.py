@@ -86,7 +86,7 @@ def _down(
     if not situation.sighting.ground_is_fresh:
         return 0.0, 'waiting for a fresh look at the ground below'
     error_m = site.distance_m(pose)
-    if tolerance_m <= 0.0 or error_m >= tolerance_m:
+    if not error_m < tolerance_m:
         limit_m = max(tolerance_m, 0.0)
         return 0.0, f'{error_m:.1f} m beside the site: descends within {limit_m:.1f} m'
     # Full speed within half of the tolerance, none at its edge.

@@ -136,7 +136,7 @@ class Helm:
         wish, note = velocity(self.state, situation, p)
         # What a fence takes from the speed is no drift.
         fenced = telemetry is not None and telemetry.fence != ''
-        self._drift.see(pose if self._engaged and not fenced else None, self._told)
+        self._drift.see(None if fenced else pose, self._told)
         wish = self._drift.made_up(wish, self._lateral_limit_m_s(pose))
         setpoint, guard_notes = self._guard.limit(wish, situation)
         self._told = setpoint
@@ -158,7 +158,7 @@ class Helm:
         )
 
     def _lateral_limit_m_s(self, pose: Pose | None) -> float:
-        high = pose is not None and at_safe_altitude(pose, self._p)
+        high = at_safe_altitude(pose, self._p)
         return self._p.lateral_speed_limit if high else self._p.landing_lateral_speed_limit
 
     def _time_in_state_s(self, now_ns: int) -> float:

@@ -14,7 +14,6 @@ import numpy as np
 
 from peace_ros.core.domain import NADIR, Camera, DepthImage, Frame, Heatmap, ImageError, Mount, Pose
 from peace_ros.core.domain.geometry import camera_pose
-from peace_ros.core.domain.motion import FARTHEST_M
 from peace_ros.core.landing.calibration import Calibration, has_shape
 from peace_ros.core.landing.odometry import PositionCarrier
 from peace_ros.core.landing.parameters import LandingParameters
@@ -93,8 +92,7 @@ class HeatmapIntake:
             return
         pose = camera_pose(self._mount, pose)
         if not pose.has_position:
-            can_be = abs(pose.altitude_agl_m) <= FARTHEST_M and pose.has_attitude
-            kept = can_be and self._carrier.add_pose(pose)
+            kept = self._carrier.add_pose(pose)
         else:
             before = self._poses.newest
             kept = self._poses.add(pose)

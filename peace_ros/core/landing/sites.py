@@ -84,6 +84,19 @@ def clearance(safe: NDArray[np.bool_], cell_m: float) -> NDArray[np.float32]:
     return cast('NDArray[np.float32]', np.maximum(cells * cell_m - 0.5 * cell_m, 0.0))
 
 
+def confidence(score: NDArray[np.float32], radius_m: float, cell_m: float) -> NDArray[np.float32]:
+    """Return the mean score within a radius around each cell; rows x columns.
+
+    Beyond the edge of the array the scores of its edge go on.
+    """
+    reach = ceil(radius_m / cell_m)
+    offset_m = np.arange(-reach, reach + 1) * cell_m
+    disc = np.add.outer(offset_m**2, offset_m**2) <= radius_m**2
+    mean = disc.astype(np.float32) / np.float32(disc.sum())
+    means = cv2.filter2D(score, -1, mean, borderType=cv2.BORDER_REPLICATE)
+    return cast('NDArray[np.float32]', means)
+
+
 def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) -> Verdict:
     """Choose a site within the focus, or say why there is none.
 
@@ -116,7 +129,9 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
     preferred = wide & (ground.clearance_m >= p.preferred_clearance_m)
     candidates = preferred if preferred.any() else wide
     merits = _merits(ground, search)
-    best = _highest(worth(_with_shapes(merits, candidates, layers.cell_m), p), candidates)
+    half_width_m, compactness = shapes(candidates, layers.cell_m)
+    shaped = replace(merits, half_width_m=half_width_m, compactness=compactness)
+    best = _highest(worth(shaped, p), candidates)
     # Shapes stay out of this comparison: pieces of ground merge and split from frame to frame.
     value = worth(merits, p)
     kept_cell = None if kept is None else layers.cell_at(*kept)
@@ -133,31 +148,28 @@ def _highest(value: NDArray[np.float32], candidates: NDArray[np.bool_]) -> tuple
 
 def _merits(ground: _JudgedGround, search: Search) -> Merits:
     """Return the merits of every cell by itself, as seen from the vehicle."""
-    layers, radius_m = ground.layers, search.required_clearance_m
-    reach = ceil(radius_m / layers.cell_m)
-    offset_m = np.arange(-reach, reach + 1) * layers.cell_m
-    disc = np.add.outer(offset_m**2, offset_m**2) <= radius_m**2
-    mean = disc.astype(np.float32) / np.float32(disc.sum())
-    confidence = cv2.filter2D(layers.score, -1, mean, borderType=cv2.BORDER_REPLICATE)
+    layers = ground.layers
     return Merits(
         clearance_m=ground.clearance_m,
-        confidence=cast('NDArray[np.float32]', confidence),
+        confidence=confidence(layers.score, search.required_clearance_m, layers.cell_m),
         distance_m=np.hypot(*layers.distances_m(search.pose.north_m, search.pose.east_m)),
     )
 
 
-def _with_shapes(merits: Merits, candidates: NDArray[np.bool_], cell_m: float) -> Merits:
-    """Return the merits with the shape of the connected piece of candidates around each cell."""
+def shapes(
+    candidates: NDArray[np.bool_], cell_m: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return half width (m) and compactness of the connected piece around each candidate cell.
+
+    Cells are connected by their sides. What is returned for other cells means nothing.
+    """
     _, labels = cv2.connectedComponents(candidates.astype(np.uint8), connectivity=4)
     inner = cv2.erode(candidates.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     area = np.bincount(labels.ravel())
     rim = np.maximum(np.bincount(labels[candidates & ~inner], minlength=area.size), 1)
     compactness = np.minimum(1.0, 4.0 * pi * area / (rim * rim))
-    return replace(
-        merits,
-        half_width_m=(area / rim * cell_m).astype(np.float32)[labels],
-        compactness=compactness.astype(np.float32)[labels],
-    )
+    half_width_m = area / rim * cell_m
+    return half_width_m.astype(np.float32)[labels], compactness.astype(np.float32)[labels]
 
 
 def _keep(

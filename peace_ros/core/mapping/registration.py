@@ -10,7 +10,7 @@ agree after it; otherwise the result is a reason.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
 from math import hypot, isfinite, radians
@@ -135,8 +135,7 @@ def register(before: View, after: View, camera: Camera) -> Displacement | Mismat
 def _seen_by(view: View, camera: Camera) -> tuple[Camera, Pose]:
     """Return the camera of the small picture, and its pose above the origin."""
     height, width = view.grey.shape
-    pose = Pose(0, 0.0, 0.0, 0.0, view.pose.quaternion_ned_frd, view.pose.altitude_agl_m)
-    return camera.resized(width, height), pose
+    return camera.resized(width, height), replace(view.pose, north_m=0.0, east_m=0.0)
 
 
 def _middle(view: View, camera: Camera) -> NDArray[np.float64] | None:
@@ -269,10 +268,13 @@ def _agreement(
     first: NDArray[np.float32], second: NDArray[np.float32], down_px: int, right_px: int
 ) -> float:
     """Return the correlation of the ground that is in both patches, -1 to 1."""
-    one = first[max(0, down_px) : PATCH_PX + min(0, down_px)]
-    other = second[max(0, -down_px) : PATCH_PX + min(0, -down_px)]
-    one = one[:, max(0, right_px) : PATCH_PX + min(0, right_px)]
-    other = other[:, max(0, -right_px) : PATCH_PX + min(0, -right_px)]
+    one = first[_shared(down_px), _shared(right_px)]
+    other = second[_shared(-down_px), _shared(-right_px)]
     one, other = one - one.mean(), other - other.mean()
     size = float(np.sqrt((one * one).sum() * (other * other).sum()))
     return 0.0 if size < 1e-6 else float((one * other).sum()) / size
+
+
+def _shared(ahead_px: int) -> slice:
+    """Return the pixels of a patch that lie in the other one too, which is ahead by so many."""
+    return slice(max(0, ahead_px), PATCH_PX + min(0, ahead_px))

@@ -10,11 +10,12 @@ from math import nan
 import numpy as np
 import pytest
 
-from peace_ros.core.domain import Camera, Frame, Pose
-from peace_ros.core.landing import odometry
+from peace_ros.core.domain import Camera, Frame, Heatmap, Pose
+from peace_ros.core.landing import LandingParameters, odometry
+from peace_ros.core.landing.intake import HeatmapIntake
 from peace_ros.core.landing.odometry import PositionCarrier, VisualOdometry
 from peace_ros.core.landing.poses import Miss, PoseHistory
-from peace_ros.core.mapping import Displacement, MapParameters, Mismatch, View
+from peace_ros.core.mapping import Displacement, MapParameters, Mismatch, SafetyMap, View
 
 S = 1_000_000_000
 CAMERA = Camera.from_degrees(256, 256, 73.0)
@@ -303,6 +304,16 @@ def test_pictures_without_an_attitude_are_left_out(trip: Trip, shifts: Shifts) -
     assert trip.carrier.is_carrying
 
 
+def test_a_picture_without_an_attitude_does_not_delay_the_next(trip: Trip, shifts: Shifts) -> None:
+    shifts.set(1, 3, 1.0, 0.0, 0.1)
+    for number, later_s in ((2, 0.6), (3, 2.0)):
+        image = np.full((8, 8, 3), number, np.uint8)
+        trip.carrier.add_view(Frame(image, trip.now_ns + round(later_s * S)))
+    trip.carrier.add_pose(pose_of(trip.time_s + 2.0, nan, nan))
+    assert trip.carrier.settle(trip.positions) == ''
+    assert trip.carrier.newest_ns == trip.now_ns + 2 * S
+
+
 def test_of_pictures_the_newest_eight_wait(trip: Trip, shifts: Shifts) -> None:
     for number in range(2, 12):
         image = np.full((8, 8, 3), number, np.uint8)
@@ -322,3 +333,36 @@ def test_clearing_forgets_the_way_and_lets_the_clock_begin_anew(trip: Trip, shif
     trip.time_s = -0.2
     assert trip.see(3) == '', 'earlier stamps are taken'
     assert not trip.carrier.is_carrying
+
+
+class NotedMap(SafetyMap):
+    """Notes from where each heatmap was seen: stamp in seconds and metres to the north."""
+
+    def __init__(self) -> None:
+        super().__init__(MapParameters(map_size_m=120.0))
+        self.seen_from: list[tuple[float, float]] = []
+
+    def add(self, heatmap: Heatmap, camera: Camera, pose: Pose) -> None:
+        self.seen_from.append((heatmap.stamp_ns / S, pose.north_m))
+        super().add(heatmap, camera, pose)
+
+
+def test_heatmaps_are_seen_from_told_positions_before_a_gap_and_from_carried_ones_in_it(
+    shifts: Shifts,
+) -> None:
+    noted = NotedMap()
+    intake = HeatmapIntake(LandingParameters(), CAMERA, noted)
+    shifts.set(2, 3, 1.0, 0.0, 0.1)
+    for number, time_s, north_m in ((1, 1.0, 0.0), (2, 1.25, 0.0), (3, 1.5, nan)):
+        intake.add_pose(pose_of(time_s, north_m, north_m))
+        image = np.full((8, 8, 3), number, np.uint8)
+        intake.add_view(Frame(image, round(time_s * S)))
+    # A position is back, but no picture has confirmed it.
+    intake.add_pose(pose_of(1.75, 3.0))
+    for value, time_s in ((0.7, 1.2), (0.8, 1.5), (0.9, 1.75)):
+        intake.add_heatmap(Heatmap(np.full((48, 48), value, np.float32), round(time_s * S)))
+    assert noted.seen_from == [(1.2, 0.0), (1.5, 1.0)]
+    assert intake.counts == {'used': 2}, 'the third waits'
+    shifts.set(2, 4, 2.0, 0.0, 0.1)
+    intake.add_view(Frame(np.full((8, 8, 3), 4, np.uint8), round(1.75 * S)))
+    assert noted.seen_from[2:] == [(1.75, 3.0)]

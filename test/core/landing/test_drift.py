@@ -97,6 +97,7 @@ def known() -> Drift:
         (1.5, 1.0, True),
         (1.51, 1.0, False),
         (1.1, 2.99, True),
+        (1.1, 3.0, True),
         (1.1, 3.01, False),
         (1.1, -3.01, False),
     ],
@@ -109,18 +110,19 @@ def test_gaps_and_jumps_teach_nothing_and_lose_nothing(
     assert (drift.velocity_m_s != KNOWN) == counts
 
 
-def test_after_a_gap_it_goes_on_from_where_the_vehicle_is() -> None:
-    for gap in (
-        lambda drift: drift.see(pose_of(9.0, 50.0, 60.0), told(1.0, -1.0)),
-        lambda drift: drift.see(pose_of(1.1, 50.0, 60.0), told(1.0, -1.0)),
-    ):
-        drift = known()
-        gap(drift)
-        begun_s = drift._stamp_ns / S
-        # It flies on as told and as it drifts: nothing is to be learned.
-        place = (50.0 + 0.1 * (1.0 + KNOWN[0]), 60.0 + 0.1 * (-1.0 + KNOWN[1]))
-        drift.see(pose_of(begun_s + 0.1, *place), told(1.0, -1.0))
-        assert drift.velocity_m_s == pytest.approx(KNOWN)
+@pytest.mark.parametrize(
+    ('time_s', 'north_m', 'east_m'), [(9.0, 50.0, 60.0), (1.1, 50.0, 0.0), (1.1, 0.0, 60.0)]
+)
+def test_after_a_gap_it_goes_on_from_where_the_vehicle_is(
+    time_s: float, north_m: float, east_m: float
+) -> None:
+    drift = known()
+    drift.see(pose_of(time_s, north_m, east_m), told(1.0, -1.0))
+    assert drift.velocity_m_s == KNOWN
+    # It flies on as told and as it drifts: nothing is to be learned.
+    place = (north_m + 0.1 * (1.0 + KNOWN[0]), east_m + 0.1 * (-1.0 + KNOWN[1]))
+    drift.see(pose_of(time_s + 0.1, *place), told(1.0, -1.0))
+    assert drift.velocity_m_s == pytest.approx(KNOWN)
 
 
 @pytest.mark.parametrize('unknown', [None, pose_of(1.1, nan, nan)])

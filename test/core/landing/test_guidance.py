@@ -3,7 +3,7 @@
 """Guidance: towards the site, down over it, slow before the floor, never across the unknown."""
 
 from dataclasses import replace
-from math import hypot
+from math import hypot, inf, nan
 
 import pytest
 from hypothesis import given
@@ -222,6 +222,12 @@ def test_a_return_flies_straight_home_at_the_safe_altitude_and_climbs_below(
     assert 'not known' in note
 
 
+@pytest.mark.parametrize('north_m', [nan, inf])
+def test_beside_a_site_of_which_the_distance_is_not_known_nothing_descends(north_m):
+    site = Site(north_m, 0.0, 6.0, 100.0, 0.9, 0.1)
+    assert velocity(State.LANDING, situation(40.0, site=site), P)[0].v_down_m_s == 0.0
+
+
 @pytest.mark.parametrize('state', State)
 def test_nothing_moves_without_a_valid_pose(state):
     assert velocity(state, situation(pose=None), P)[0].is_zero
@@ -237,17 +243,21 @@ def test_a_waypoint_is_reached_within_5_m_and_a_wide_spacing_stays_at_home():
     square = ExpandingSquare((0.0, 0.0), 30.0, 100.0)
     assert square.target(Pose(0, 24.9, 0.0, -60.0, LEVEL, 60.0)) == (30.0, 0.0)
     assert square.target(Pose(0, 25.0, 0.0, -60.0, LEVEL, 60.0)) == (30.0, 30.0)
+    assert square.target(Pose(0, 30.0, 0.0, -60.0, LEVEL, 60.0)) == (30.0, 30.0), 'east too'
+    just = ExpandingSquare((0.0, 0.0), 30.0, 30.0)
+    assert just.target(Pose(0, 0.0, 0.0, -60.0, LEVEL, 60.0)) == (30.0, 0.0)
     narrow = ExpandingSquare((10.0, 20.0), 30.0, 20.0)
     for north_m in (10.0, 40.0):
         assert narrow.target(Pose(0, north_m, 20.0, -60.0, LEVEL, 60.0)) == (10.0, 20.0)
 
 
 def test_a_square_far_from_the_origin_stays_around_its_home():
-    square, north, east = ExpandingSquare((-300.0, 500.0), 30.0, 100.0), -300.0, 500.0
+    square, north, east, targets = ExpandingSquare((-300.0, 500.0), 30.0, 100.0), -300.0, 500.0, []
     for _ in range(12):
         north, east = square.target(Pose(0, north, east, -60.0, LEVEL, 60.0))
-        assert hypot(north + 300.0, east - 500.0) <= 100.0
-    assert (north, east) != (-300.0, 500.0)
+        targets.append((north + 300.0, east - 500.0))
+        assert hypot(*targets[-1]) <= 100.0
+    assert targets[:4] == [(30.0, 0.0), (30.0, 30.0), (-30.0, 30.0), (-30.0, -30.0)]
 
 
 def test_at_its_tolerance_beside_the_site_it_says_that_it_waits():

@@ -313,6 +313,16 @@ def test_aiming_ends_low_enough_over_the_site_on_ground_just_seen(changes, state
     assert decided(helm, **changes).state is state
 
 
+def test_aiming_ends_at_exactly_a_metre_above_its_floor():
+    helm = Helm.engaged_in(LandingParameters(safe_altitude_m=40.0), State.AIMING)
+    assert decided(helm, altitude_m=45.0).state is State.LANDING
+
+
+def test_without_a_rejection_an_old_map_asks_for_the_segmentation():
+    decision = decided(Helm.engaged_in(LandingParameters(), State.SEARCHING), map_age_s=2.1)
+    assert decision.reason.endswith('limit 2.0 s: is segmentation running?')
+
+
 @pytest.mark.parametrize(
     ('changes', 'state'),
     [

@@ -125,8 +125,9 @@ def test_a_site_is_chosen_once_enough_was_seen_since_the_state_began() -> None:
         assert steps.step(site=site_at(), frames=1).state is State.SEARCHING
     assert steps.step(site=site_at(), frames=1).state is State.AIMING
     again = Steps(state=State.WAITING)
-    again.step(site=None, frames=4)
-    assert again.step(site=site_at()).state is State.AIMING, 'counted from zero in a trial'
+    again.revision = 4
+    assert again.step(site=site_at()).state is State.WAITING, 'counted from zero in a trial'
+    assert again.step(site=site_at(), frames=1).state is State.AIMING
 
 
 @pytest.mark.parametrize(
@@ -262,6 +263,13 @@ def flown_to(steps: Steps, *, frames: int = 60) -> tuple[float, float]:
     return far_north, far_east
 
 
+def test_a_search_is_flown_around_where_the_landing_began() -> None:
+    steps = Steps(state=State.SEARCHING)
+    steps.step()
+    decision = steps.step(pose_of(60.0, 200.0, 0.0), later_s=6.0)
+    assert decision.setpoint.v_north_m_s < 0.0
+
+
 @pytest.mark.parametrize(('fence_m', 'flies'), [(0.0, True), (66.0, True), (64.0, False)])
 def test_a_search_turns_five_metres_before_the_fence(fence_m: float, flies: bool) -> None:
     parameters = replace(P, geofence_radius_m=fence_m)
@@ -278,6 +286,41 @@ def test_a_budget_that_is_used_up_ends_the_landing() -> None:
     assert decision.state is State.HOLD
     assert decision.reason == 'not landed within 10 s: holding'
     assert decision.outcome == 'no_zone'
+
+
+def test_a_site_seen_with_bad_data_is_no_site() -> None:
+    steps = Steps(replace(P, max_total_s=10.0), State.SEARCHING)
+    steps.age_s = 0.8
+    for _ in range(3):
+        steps.step(site=site_at())
+    steps.age_s = 0.1
+    assert steps.step(later_s=11.0).outcome == 'no_zone', 'and not "timeout": none was known'
+
+
+@pytest.mark.parametrize(
+    ('state', 'age_s', 'counted_s'),
+    [(State.SEARCHING, 0.1, 4.0), (State.SEARCHING, 0.8, 0.0), (State.WAITING, 0.1, 0.0)],
+)
+def test_time_without_a_site_counts_in_a_search_with_good_data(
+    state: State, age_s: float, counted_s: float
+) -> None:
+    steps = Steps(state=state)
+    steps.step(later_s=0.0)
+    steps.age_s = age_s
+    steps.step(later_s=4.0)
+    assert steps.helm.without_site_s == pytest.approx(counted_s)
+
+
+def test_bad_data_during_a_return_end_nothing() -> None:
+    steps = Steps(replace(P, max_total_s=10.0, budget_policy='return'), State.SEARCHING)
+    steps.step(pose_of(60.0, 50.0))
+    assert steps.step(pose_of(60.0, 90.0), later_s=11.0).state is State.RETURNING
+    steps.age_s = 0.8
+    decision = steps.step(pose_of(60.0, 90.0))
+    assert decision.state is State.HOLD
+    assert decision.outcome is None
+    steps.age_s = 0.1
+    assert steps.step(pose_of(60.0, 90.0)).state is State.RETURNING
 
 
 @pytest.mark.parametrize(('aside_m', 'state'), [(3.1, State.RETURNING), (2.9, State.HOLD)])
@@ -351,20 +394,16 @@ def test_a_reason_is_told_as_it_began_while_only_its_numbers_change() -> None:
     assert 'searching' in steps.step(pose_of(30.0), map_age_s=0.1).reason
 
 
-def led(
-    altitude_m: float, aside_m: float, bias_m_s: float, *, engaged: bool = True
-) -> tuple[float, float]:
+def led(altitude_m: float, aside_m: float, bias_m_s: float) -> tuple[float, float]:
     """Hold the vehicle beside its site, drifting; return north and east speed at the end."""
-    steps = Steps(state=State.AIMING if engaged else None)
+    steps = Steps(state=State.AIMING)
     north = 0.0
-    for tick in range(300):
+    for _ in range(300):
         stamp_ns = round((steps.at_s + 0.1) * S)
         pose = replace(pose_of(altitude_m, north), stamp_ns=stamp_ns)
         decision = steps.step(pose, site_at(north + aside_m, 0.0, 40.0))
         told = decision.setpoint.v_north_m_s
         north += 0.1 * (told + bias_m_s)
-        if not engaged and tick == 280:
-            steps.helm.engage()
     return decision.setpoint.v_north_m_s, decision.setpoint.v_east_m_s
 
 
@@ -375,6 +414,7 @@ def led(
         (60.0, 2.0, 0.0, 0.7),
         (60.0, 2.0, 0.5, 0.3),
         (60.0, 2.0, -0.5, 1.1),
+        (60.0, 4.0, -0.5, 1.8),
         (60.0, 20.0, -0.5, 5.0),
         (40.0, 20.0, -0.5, 1.5),
         (40.0, 2.0, -0.5, 1.4),

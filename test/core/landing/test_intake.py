@@ -126,9 +126,17 @@ def test_attitude_without_position_places_nothing(intake, safety_map):
     assert intake.counts['used'] == 20
 
 
+@pytest.mark.parametrize(
+    'change', [{'altitude_agl_m': nan}, {'altitude_agl_m': 2e6}, {'quaternion_ned_frd': (0.0,) * 4}]
+)
+def test_an_attitude_that_cannot_be_is_rejected(intake, change):
+    intake.add_pose(replace(pose_of(2.1), north_m=nan, east_m=nan, **change))
+    assert intake.counts['pose rejected'] == 1
+
+
 def test_a_heatmap_waits_for_its_pose_no_longer_than_its_limit(intake):
     intake.add_heatmap(heatmap_of(2.05))
-    for now_s, is_lost in ((2.1, False), (3.1, False), (3.2, True)):
+    for now_s, is_lost in ((2.1, False), (3.1, False), (3.1 + 1e-9, True)):
         intake.tick(round(now_s * S))
         assert bool(intake.counts['no pose after its stamp']) is is_lost
     assert intake.last_rejection == 'no pose after its stamp'
@@ -154,7 +162,7 @@ def test_four_heatmaps_wait_and_the_oldest_makes_room(intake):
     assert intake.counts['used'] == 24
 
 
-@pytest.mark.parametrize(('ahead_s', 'is_taken'), [(0.5, True), (0.51, False)])
+@pytest.mark.parametrize(('ahead_s', 'is_taken'), [(0.5, True), (0.5 + 1e-9, False)])
 def test_a_stamp_may_lie_ahead_of_the_clock_up_to_the_tolerance(intake, ahead_s, is_taken):
     intake.add_heatmap(heatmap_of(2.0 + ahead_s))
     intake.add_pose(pose_of(2.0 + ahead_s))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from peace_ros.core.domain import Pose, Site
-from peace_ros.core.landing import LandingParameters, State, VerdictKind
+from peace_ros.core.landing import LandingParameters, State, Verdict, VerdictKind
 from peace_ros.core.landing.lookout import Lookout
 from peace_ros.core.mapping import MapLayers, MapParameters
 
@@ -31,12 +31,12 @@ class PaintedMap:
     asked: list[tuple[float, float, float]] = field(default_factory=list)
     discs: list[tuple[float, float, float, float]] = field(default_factory=list)
 
-    def layers(self, _now_ns: int, around: tuple[float, float, float]) -> MapLayers:
+    def layers(self, now_ns: int, around: tuple[float, float, float]) -> MapLayers:
         self.asked.append(around)
         shape = (200, 200)
         layers = MapLayers(
             np.full(shape, self.score, np.float32),
-            np.full(shape, self.age_s, np.float32),
+            np.full(shape, self.age_s + (now_ns - (self.stamp_ns or 0)) / S, np.float32),
             np.full(shape, 9, np.uint16),
             0.5,
             -50.0,
@@ -70,6 +70,7 @@ def look(lookout, painted, state, pose=HIGH, without_site_s=0.0, *, is_new=True)
 
 def test_a_sighting_tells_what_the_map_says(painted):
     pose = replace(HIGH, north_m=0.2, east_m=0.3)
+    painted.age_s = 0.0
     lookout = Lookout(P, painted)
     seen = lookout.look(painted.stamp_ns + 3 * S // 2, pose, State.SEARCHING, 0.0)
     assert seen.ground_score == pytest.approx(0.5 + P.safety_radius_m)
@@ -205,9 +206,13 @@ def test_the_threshold_sinks_with_the_time_without_a_site(painted, without_site_
     assert look(lookout, painted, State.AIMING).threshold == 0.8
 
 
+@pytest.mark.parametrize('age_s', [0.1, 20.0])
 @pytest.mark.parametrize(('safe_share', 'threshold'), [(0.2, 0.8), (0.05, 0.7)])
-def test_the_threshold_does_not_sink_where_enough_ground_is_safe(painted, safe_share, threshold):
+def test_the_threshold_does_not_sink_where_enough_ground_is_safe(
+    painted, safe_share, threshold, age_s
+):
     painted.score = 0.1
+    painted.age_s = age_s
     painted.discs = [(0.0, 0.0, 100.0 * (safe_share / np.pi) ** 0.5, 0.95)]
     lookout = Lookout(replace(P, relaxation=True), painted)
     seen = look(lookout, painted, State.SEARCHING, without_site_s=60.0)
@@ -243,6 +248,72 @@ def test_an_approach_that_fails_closes_the_place_but_is_no_descent(painted):
     assert lookout.failed_sites == 1
 
 
+def test_an_approach_whose_site_got_lost_closes_the_place_that_it_aimed_at(painted):
+    lookout = Lookout(P, painted)
+    site = look(lookout, painted, State.SEARCHING).verdict.site
+    lookout.follow(State.SEARCHING, State.AIMING, 10 * S)
+    painted.score = 0.1
+    assert look(lookout, painted, State.AIMING).verdict.site is None
+    lookout.follow(State.AIMING, State.WAITING, 11 * S)
+    lookout.follow(State.WAITING, State.RESTARTING, 12 * S)
+    (failed,) = lookout._memory.failed
+    assert (failed.north_m, failed.east_m) == (site.north_m, site.east_m)
+
+
+def test_the_present_choice_stays_while_the_vehicle_flies_past_an_equal_one(painted):
+    painted.score = 0.1
+    painted.discs = [(20.0, 0.0, 9.0, 0.95), (-20.0, 0.0, 9.0, 0.95)]
+    lookout = Lookout(P, painted)
+    for north_m in (5.0, -5.0):
+        pose = replace(HIGH, north_m=north_m)
+        assert look(lookout, painted, State.SEARCHING, pose).verdict.site.north_m > 10.0
+    fresh = look(Lookout(P, painted), painted, State.SEARCHING, pose)
+    assert fresh.verdict.site.north_m < -10.0
+
+
+@pytest.mark.parametrize(
+    ('north_m', 'east_m', 'moved'),
+    [
+        (16.0, 30.0, ''),
+        (10.0, 24.0, ''),
+        (13.6, 34.8, ''),
+        (16.1, 30.0, '6.1'),
+        (14.0, 35.0, '6.4'),
+    ],
+)
+def test_a_site_may_move_by_its_clearance_during_a_descent(painted, north_m, east_m, moved):
+    lookout = Lookout(P, painted)
+    lookout._verdict = Verdict.found(Site(10.0, 30.0, 6.0, 100.0, 0.9, 0.1))
+    now = Verdict.found(Site(north_m, east_m, 7.0, 100.0, 0.9, 0.1))
+    assert lookout.anchored(now) is now, 'no descent has begun'
+    lookout.follow(State.AIMING, State.LANDING, 10 * S)
+    lost = Verdict.no_zone('fog')
+    assert lookout.anchored(lost) is lost
+    found = lookout.anchored(now)
+    if moved:
+        assert found.site is None
+        assert found.reason == (
+            f'the safe place moved by {moved} m, more than its clearance of 6.0 m'
+        )
+    else:
+        assert found is now
+
+
+def test_the_first_heatmap_is_judged_at_once_and_after_each_change_of_state(painted):
+    painted.stamp_ns = S // 10
+    lookout = Lookout(P, painted)
+    assert lookout.look(S // 10, HIGH, State.SEARCHING, 0.0).verdict.site is not None
+    lookout.follow(State.SEARCHING, State.AIMING, S // 10)
+    painted.asked.clear()
+    lookout.look(S // 10, HIGH, State.AIMING, 0.0)
+    assert painted.asked
+
+
+def test_the_ground_below_is_asked_for_around_the_vehicle(painted):
+    look(Lookout(P, painted), painted, State.LANDING, replace(HIGH, north_m=3.0, east_m=-4.0))
+    assert painted.asked[-1] == (3.0, -4.0, P.safety_radius_m + 2.0)
+
+
 @pytest.mark.parametrize('state', [State.SEARCHING, State.RESTARTING, State.RETURNING])
 def test_a_search_or_a_return_frees_the_site_from_where_it_was(painted, state):
     lookout = Lookout(P, painted)
@@ -275,3 +346,5 @@ def test_low_down_a_site_is_reachable_within_its_clearance(painted, pose, east_m
     site = Site(0.0, east_m, 6.0, 100.0, 0.9, 0.1)
     lookout._verdict = replace(lookout._verdict, site=site)
     assert lookout.reachable(pose) is (site if is_reachable else None)
+    seen = look(lookout, painted, State.AIMING, pose, is_new=False)
+    assert seen.reachable is (site if is_reachable else None)

@@ -12,8 +12,10 @@ S = 1_000_000_000
 P = LandingParameters()
 
 
-def site(north_m: float, clearance_m: float = 6.0, confidence: float = 0.9) -> Site:
-    return Site(north_m, 0.0, clearance_m, 100.0, confidence, 0.1)
+def site(
+    north_m: float, clearance_m: float = 6.0, confidence: float = 0.9, east_m: float = 0.0
+) -> Site:
+    return Site(north_m, east_m, clearance_m, 100.0, confidence, 0.1)
 
 
 @pytest.mark.parametrize(('clearance_m', 'radius_m'), [(3.0, 8.0), (10.0, 10.0), (50.0, 12.0)])
@@ -76,6 +78,14 @@ def test_a_place_is_remembered_as_it_was_last_seen():
     memory.see(site(30.0, 7.0))
     memory.see(site(1.0, 4.0))
     assert memory.best().north_m == 30.0
+
+
+def test_a_place_far_from_the_origin_is_known_again():
+    memory = SiteMemory(P)
+    memory.see(site(700.0, 11.0, east_m=-900.0))
+    memory.see(site(0.0, 9.0))
+    memory.see(site(703.0, 4.0, east_m=-904.0))
+    assert memory.best().north_m == 0.0
 
 
 @pytest.mark.parametrize(('apart_m', 'north_m'), [(10.0, 1000.0), (10.1, 0.0)])

@@ -47,9 +47,12 @@ def test_what_weakens_or_extends_a_landing_is_off_until_asked_for():
     assert p.budget_policy == 'hold'
 
 
-def test_clearance_needed_grows_with_altitude():
-    p = LandingParameters()
-    assert p.required_clearance_m(100.0) > p.required_clearance_m(20.0) > p.safety_radius_m
+@pytest.mark.parametrize(
+    ('altitude_m', 'clearance_m'), [(100.0, 4.5), (20.0, 2.9), (0.5, 2.51), (0.0, 2.5), (-9.0, 2.5)]
+)
+def test_clearance_needed_grows_with_altitude(altitude_m, clearance_m):
+    p = LandingParameters(safety_radius_m=1.5, position_margin_m=1.0, projection_error=0.02)
+    assert p.required_clearance_m(altitude_m) == pytest.approx(clearance_m)
 
 
 @pytest.mark.parametrize('parameters', [LandingParameters, MapParameters])

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pose at a stamp is interpolated between near, believable poses, or there is none."""
 
+from dataclasses import replace
 from math import cos, degrees, nan, radians
 
 import pytest
@@ -73,6 +74,28 @@ def test_nothing_is_extrapolated_nor_guessed_over_a_gap(time_s, miss):
 )
 def test_what_no_vehicle_does_is_not_interpolated(after, miss):
     assert history_of(pose_of(1.0), after).at(round(1.05 * S)) is miss
+
+
+@pytest.mark.parametrize(
+    ('north_m', 'altitude_m', 'miss'),
+    [
+        # In 0.1 s: 2 m + 3 m along the ground, 1 m + 1.5 m up or down.
+        (5.0, 50.0, None),
+        (5.001, 50.0, Miss.JUMP),
+        (0.0, 52.5, None),
+        (0.0, 47.499, Miss.JUMP),
+    ],
+)
+def test_a_jump_is_more_than_any_vehicle_flies(north_m, altitude_m, miss):
+    after = replace(pose_of(1.1, altitude_m=altitude_m), north_m=north_m)
+    pose = history_of(pose_of(1.0), after).at(round(1.05 * S))
+    assert pose is miss if miss else pose.north_m == pytest.approx(north_m / 2.0)
+
+
+def test_a_gap_is_longer_than_its_limit():
+    for seconds, is_gap in ((0.5, False), (0.5 + 1e-9, True)):
+        found = history_of(pose_of(1.0), pose_of(1.0 + seconds)).at(round(1.1 * S))
+        assert (found is Miss.GAP) is is_gap
 
 
 def test_what_a_vehicle_can_fly_is_no_jump():

@@ -12,7 +12,14 @@ from hypothesis import strategies as st
 from peace_ros.core.domain import Pose, Site
 from peace_ros.core.landing import SAFETY_THRESHOLD_FLOOR, Focus, LandingParameters, VerdictKind
 from peace_ros.core.landing.memory import FailedPlace
-from peace_ros.core.landing.sites import Search, clearance, find_site, safe_ground
+from peace_ros.core.landing.sites import (
+    Search,
+    clearance,
+    confidence,
+    find_site,
+    safe_ground,
+    shapes,
+)
 from peace_ros.core.mapping import MapLayers
 
 P = LandingParameters()
@@ -139,8 +146,12 @@ def test_looks_only_within_the_focus():
 def test_places_that_failed_are_left_out():
     layers = layers_with((0.0, 0.0, 6.5), (35.0, 0.0, 6.5))
     assert abs(find_site(layers, SEARCH, P).site.north_m) < 3.0
-    again = find_site(layers, replace(SEARCH, failed=(FailedPlace(0.0, 0.0, 8.0, 0),)), P).site
+    failed = (FailedPlace(0.0, 0.0, 8.0, 0), FailedPlace(-40.0, 0.0, 5.0, 0))
+    again = find_site(layers, replace(SEARCH, failed=failed), P).site
     assert again.north_m > 30.0
+    near = replace(SEARCH, focus=Focus(0.0, 0.0, 12.0), failed=failed[1:])
+    wide_beyond = layers_with((0.0, 0.0, 6.5), (35.0, 0.0, 12.0))
+    assert abs(find_site(wide_beyond, near, P).site.north_m) < 3.0, 'not beyond the focus'
 
 
 def layers_of_boxes(*boxes: tuple[float, float, float, float], score: float = 0.95) -> MapLayers:
@@ -222,9 +233,16 @@ def test_a_choice_is_kept_down_to_85_percent_of_the_clearance_it_needs():
 
 @pytest.mark.parametrize('step', [0.1, 0.5, 1.0])
 def test_a_choice_moves_by_the_focus_step_towards_the_middle_of_its_ground(step):
-    search = replace(SEARCH, incumbent=Site(0.25, 1.25, 6.0, 250.0, 0.95, 0.0))
+    search = replace(SEARCH, incumbent=Site(-0.75, 1.25, 6.0, 250.0, 0.95, 0.0))
     site = find_site(layers_with((0.25, 0.25, 9.0)), search, replace(P, focus_step=step)).site
-    assert (site.north_m, site.east_m) == pytest.approx((0.25, 1.25 - step))
+    assert (site.north_m, site.east_m) == pytest.approx((-0.75 + step, 1.25 - step))
+
+
+def test_a_choice_does_not_move_towards_wider_ground_far_away():
+    layers = layers_with((0.25, 0.25, 9.0), (0.25, 32.25, 15.0))
+    search = replace(SEARCH, incumbent=Site(0.25, 0.25, 8.0, 250.0, 0.95, 0.0))
+    site = find_site(layers, search, replace(P, site_hysteresis=10.0)).site
+    assert (site.north_m, site.east_m) == (0.25, 0.25)
 
 
 def test_a_choice_does_not_drift_over_a_large_field():
@@ -242,6 +260,20 @@ def test_a_rival_may_lie_on_ground_of_exactly_the_clearance_that_is_kept():
         assert (find_site(layers, kept, P).kind is VerdictKind.SITE) is (kind is not None)
 
 
+def test_ground_of_exactly_the_clearance_that_is_needed_or_preferred_is_wide_enough():
+    layers = layers_of_boxes((-4.0, 0.0, 11.0, 30.0), (30.0, 0.0, 14.0, 40.0))
+    clear_m = clearance(safe_ground(layers, 0.8, 10.0, 3), 0.5)
+    exact_m = float(clear_m[:120].max())
+    assert exact_m < clear_m[120:].max()
+    for preferred_m, is_near in ((exact_m, True), (exact_m + 0.01, False)):
+        parameters = replace(P, preferred_clearance_m=preferred_m, ample_clearance_m=preferred_m)
+        site = find_site(layers, SEARCH, parameters).site
+        assert (site.north_m < 10.0) is is_near
+    for needed_m, kind in ((exact_m, VerdictKind.SITE), (exact_m + 0.01, VerdictKind.NO_ZONE)):
+        search = replace(SEARCH, focus=Focus(-4.0, 0.0, 12.0), required_clearance_m=needed_m)
+        assert find_site(layers, search, P).kind is kind
+
+
 def test_the_confidence_of_a_site_is_the_mean_score_within_its_clearance():
     layers = layers_with((0.25, 0.25, 8.0))
     layers.score[layers.disc(0.25, 0.25, 3.0)] = 0.9
@@ -255,6 +287,11 @@ def test_the_confidence_of_a_site_is_the_mean_score_within_its_clearance():
 def test_a_site_tells_of_its_ground_what_the_map_shows():
     layers = layers_of_boxes((0.0, 0.0, 20.0, 30.0), (30.0, 30.0, 8.0, 8.0))
     layers.age_s[:] = 1.5
+    layers.age_s[:100, :100] = layers.age_s[100:, 100:] = 20.0
+    site = find_site(layers, SEARCH, P).site
+    # Two quarters of it are old: the other two touch in one corner only.
+    assert site.area_m2 == 9.5 * 14.5
+    layers.age_s[:] = 1.5
     site = find_site(layers, SEARCH, P).site
     # Its rim is not safe: the mean over 3 x 3 cells is too low there.
     assert site.area_m2 == 19.0 * 29.0
@@ -266,6 +303,7 @@ def test_a_site_tells_of_its_ground_what_the_map_shows():
 @pytest.mark.parametrize(('north_m', 'word'), [(0.0, 'no ground in the focus is safe'), (40.0, '')])
 def test_says_whether_ground_is_unsafe_or_not_known(north_m, word):
     layers = layers_with()
+    layers.looks[:100] = 1
     layers.looks[100:] = 0
     focus = Focus(-40.0 + north_m * 2.0, 0.0, 8.0)
     reason = find_site(layers, replace(SEARCH, focus=focus), P).reason
@@ -276,7 +314,8 @@ def test_says_that_the_focus_lies_outside_of_the_map():
     empty = np.zeros((0, 0), np.float32)
     layers = MapLayers(empty, empty, empty.astype(np.uint16), 0.5, 0.0, 0.0)
     assert find_site(layers, SEARCH, P).reason == 'the focus lies outside of the map'
-    assert safe_ground(layers, 0.8, 10.0, 3).shape == (0, 0)
+    safe = safe_ground(layers, 0.8, 10.0, 3)
+    assert (safe.shape, safe.dtype) == ((0, 0), bool)
 
 
 @pytest.mark.parametrize(
@@ -323,6 +362,8 @@ def test_says_when_only_places_that_failed_are_left():
         'the widest safe ground has 0.0 m of clearance and 3.0 m are needed, '
         'sites that failed left out'
     )
+    whole_focus = replace(SEARCH, focus=Focus(0.0, 0.0, 9.0), failed=failed)
+    assert find_site(layers_with((0.0, 0.0, 8.0)), whole_focus, P).reason == verdict.reason
 
 
 @pytest.mark.parametrize(('beside_m', 'north_wins'), [(2.0, True), (5.5, False)])
@@ -334,3 +375,35 @@ def test_confidence_counts_as_far_around_as_the_clearance_that_is_needed(beside_
         layers.score[doubtful] = np.minimum(layers.score[doubtful], 0.83)
     site = find_site(layers, SEARCH, P).site
     assert (site.north_m > 0.0) is north_wins
+
+
+@pytest.mark.parametrize('radius_m', [0.2, 0.5, 1.3, 1.5])
+def test_confidence_is_the_mean_within_a_radius(radius_m):
+    score = np.random.default_rng(2).random((9, 14), np.float32)
+    beyond = np.pad(score, 4, mode='edge')
+    rows, columns = np.mgrid[0 : beyond.shape[0], 0 : beyond.shape[1]]
+    means = confidence(score, radius_m, 0.5)
+    assert means.shape == score.shape
+    for row, column in np.ndindex(score.shape):
+        away_m = 0.5 * np.hypot(rows - row - 4, columns - column - 4)
+        assert means[row, column] == pytest.approx(beyond[away_m <= radius_m].mean(), abs=1e-5)
+
+
+def test_the_mean_of_three_by_three_cells_goes_on_beyond_the_edge():
+    layers = layers_with(score=0.0)
+    layers.score[:] = 0.9
+    layers.score[1] = 0.65
+    # (2 x 0.9 + 0.65) / 3 = 0.82 on the edge, (0.9 + 2 x 0.65) / 3 = 0.73 if it were mirrored.
+    assert safe_ground(layers, 0.8, 10.0, 3)[0].all()
+
+
+def test_shapes_are_told_by_area_and_rim_of_each_piece():
+    candidates = np.zeros((14, 40), dtype=bool)
+    candidates[1:11, 1:11] = True  # a square: 100 cells, 36 of them at the rim
+    candidates[11, 11] = True  # one cell that touches it in a corner only
+    candidates[1, 14:34] = True  # a line: 20 cells, all at the rim
+    half_width_m, compactness = shapes(candidates, 0.5)
+    assert half_width_m.dtype == compactness.dtype == np.float32
+    assert half_width_m[[5, 11, 1], [5, 11, 20]] == pytest.approx([0.5 * 100 / 36, 0.5, 0.5])
+    expected = [4.0 * np.pi * 100 / 36**2, 1.0, 4.0 * np.pi * 20 / 20**2]
+    assert compactness[[5, 11, 1], [5, 11, 20]] == pytest.approx(expected)

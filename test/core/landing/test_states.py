@@ -189,5 +189,10 @@ def test_waiting_ends_upwards_below_the_safe_altitude_and_elsewhere_above_it():
     assert next_state(State.WAITING, high, P.giveup_after_s - 0.1, P)[0] is State.WAITING
 
 
+@pytest.mark.parametrize('state', [State.SEARCHING, State.CLIMBING, State.RESTARTING])
+def test_a_state_that_stays_gives_no_reason(state):
+    assert next_state(state, FLYING, 0.0, P) == (state, '')
+
+
 def test_states_that_stand_still():
     assert {State.IDLE, State.WAITING, State.HOLD, State.ABORTED, State.HANDOVER} == STILL_STATES

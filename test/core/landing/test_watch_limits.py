@@ -137,6 +137,7 @@ def test_another_hand_is_noticed_and_stays_noticed(telemetry, word):
     found = seen(*telemetry)
     assert word in found
     assert bool(found) == bool(word)
+    assert 'disarmed' not in word or found == word
 
 
 MAP_S = P.heatmap_age_limit_s
@@ -196,6 +197,13 @@ class Engagement:
         self.at_s += seconds
         self.budget.spend(round(self.at_s * S), telemetry, looking=looking, site_known=site_known)
         return self.budget.outcome
+
+
+def test_nothing_is_used_up_at_the_begin():
+    budget = Budget(SHORT)
+    assert (budget.outcome, budget.reason) == ('', '')
+    assert (budget.without_site_s, budget.search_m, budget.attempts) == (0.0, 0.0, 0)
+    assert budget.policy_open is False
 
 
 def test_time_begins_with_the_first_step_and_is_used_up_after_the_last():

@@ -12,8 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from peace_ros.core.domain import Camera, Heatmap, Pose
+from peace_ros.core.domain import Camera, Heatmap, ImageError, Pose
 from peace_ros.core.mapping import MapParameters, SafetyMap
+from peace_ros.core.mapping.projection import Window
+from peace_ros.core.mapping.veto import Veto
 
 S = 1_000_000_000
 CAMERA = Camera.from_degrees(32, 32, 73.0)
@@ -172,3 +174,97 @@ def test_each_change_has_its_revision() -> None:
     safety_map.clear()
     assert safety_map.revision == 3
     assert safety_map.stamp_ns is None
+
+
+class NotedVeto(Veto):
+    """Notes which cells of the whole map it was last told to be clear, and to have been safe."""
+
+    clear_cells: np.ndarray
+    safe_cells: np.ndarray
+
+    def take(self, window: Window, **told: np.ndarray) -> None:
+        super().take(window, **told)
+        self.clear_cells, self.safe_cells = np.zeros((2, self._cells, self._cells), np.bool_)
+        self.clear_cells[window.slices] = told['clear']
+        self.safe_cells[window.slices] = told['was_safe']
+
+
+def test_a_look_changes_what_it_sees_and_tells_the_veto_what_is_clear_and_was_safe() -> None:
+    p = MapParameters(map_size_m=60.0, border_fraction=0.2)
+    safety_map = SafetyMap(p)
+    safety_map._veto = veto = NotedVeto(p, round(60.0 / p.map_cell_m))
+
+    def seen_from(east_m: float, value: float, time_s: int) -> np.ndarray:
+        before = safety_map.layers(time_s * S).looks
+        pose = Pose(0, 0.0, east_m, -20.0, LEVEL, 20.0)
+        safety_map.add(Heatmap(np.full((32, 32), value, np.float32), time_s * S), CAMERA, pose)
+        return np.asarray(safety_map.layers(time_s * S).looks > before)
+
+    first = seen_from(0.0, 0.6, 1)  # 0.6 is just clear
+    np.testing.assert_array_equal(veto.clear_cells, first)
+    assert not veto.safe_cells.any()
+    known = safety_map.layers(2 * S)
+    second = seen_from(4.0, 0.55, 2)
+    assert (first & ~second).any()
+    assert (second & ~first).any()
+    assert not veto.clear_cells.any()
+    np.testing.assert_array_equal(veto.safe_cells, first & second)
+    now = safety_map.layers(2 * S)
+    for name in ('score', 'age_s'):
+        before, after = getattr(known, name), getattr(now, name)
+        np.testing.assert_allclose(after[~second], before[~second], atol=1e-6)
+    assert (now.age_s[second] == 0.0).all()
+
+
+def test_a_coarse_look_is_not_clear() -> None:
+    safety_map = SafetyMap(DEFAULTS)
+    safety_map._veto = veto = NotedVeto(DEFAULTS, round(20.0 / DEFAULTS.map_cell_m))
+    for time_s, (altitude_m, is_clear) in enumerate(((20.0, True), (29.0, True), (60.0, False))):
+        pose = Pose(0, 0.0, 0.0, -altitude_m, LEVEL, altitude_m)
+        heatmap = Heatmap(np.full((32, 32), 0.9, np.float32), time_s * S)
+        safety_map.add(heatmap, CAMERA, pose)
+        assert veto.clear_cells.any() == is_clear
+
+
+def one_look(safety_map: SafetyMap, north_m: float, value: float, stamp_ns: int) -> None:
+    pose = Pose(0, north_m, 0.0, -20.0, LEVEL, 20.0)
+    safety_map.add(Heatmap(np.full((32, 32), value, np.float32), stamp_ns), CAMERA, pose)
+
+
+def test_ground_that_enters_the_window_is_as_new_as_that_of_a_new_map() -> None:
+    moved, new = SafetyMap(DEFAULTS), SafetyMap(DEFAULTS)
+    one_look(moved, 0.0, 0.7, S)
+    for safety_map in (moved, new):
+        one_look(safety_map, 30.0, 0.6, 2 * S)
+    at = moved.layers(2 * S).cell_at(30.0, 0.0)
+    assert moved.layers(2 * S).score[at] == pytest.approx(new.layers(2 * S).score[at], abs=1e-6)
+
+
+def test_ages_are_exact_by_a_clock_that_began_long_ago() -> None:
+    begun_ns = 1_900_000_000 * S
+    safety_map = SafetyMap(DEFAULTS)
+    one_look(safety_map, 0.0, 0.7, begun_ns)
+    one_look(safety_map, 0.0, 0.7, begun_ns + S // 4)
+    layers = safety_map.layers(begun_ns + S // 2)
+    assert layers.age_s[layers.cell_at(0.0, 0.0)] == pytest.approx(0.25, abs=1e-4)
+
+
+def test_pixels_are_larger_on_the_ground_the_farther_aside_they_look() -> None:
+    safety_map = SafetyMap(DEFAULTS)
+    one_look(safety_map, 0.0, 0.7, S)
+    layers = safety_map.layers(S)
+    for north_m in (0.25, 5.25, 9.25):
+        pixel_m = 20.0 / CAMERA.focal_px * (1.0 + (north_m**2 + 0.25**2) / 20.0**2)
+        cell = layers.cell_at(north_m, 0.25)
+        assert safety_map._pixel_m[cell] == pytest.approx(pixel_m, rel=1e-3)
+
+
+@pytest.mark.parametrize('value', [-0.01, 1.01, float('nan')])
+def test_values_outside_of_0_to_1_change_nothing(value: float) -> None:
+    safety_map = SafetyMap(DEFAULTS)
+    one_look(safety_map, 0.0, 0.7, S)
+    one_look(safety_map, 0.0, 0.7, 2 * S)
+    assert safety_map.revision == 2
+    with pytest.raises(ImageError, match='within 0 to 1'):
+        one_look(safety_map, 0.0, value, 3 * S)
+    assert (safety_map.revision, safety_map.stamp_ns) == (2, 2 * S)

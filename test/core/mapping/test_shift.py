@@ -73,6 +73,8 @@ def test_ground_in_both_patches_agrees_after_the_right_shift(top: int, left: int
     down_px, right_px, ratio = steps._shift(first, second)
     assert (down_px, right_px) == pytest.approx((top, left), abs=0.1)
     assert ratio > 3.0
+    faint = steps._shift(1e-3 * first, 1e-3 * second)
+    assert faint == pytest.approx((down_px, right_px, ratio), rel=0.1, abs=0.02)
 
 
 def test_even_ground_agrees_with_nothing() -> None:
@@ -100,6 +102,26 @@ def test_a_shift_is_found_to_a_part_of_a_pixel() -> None:
 def test_other_ground_has_no_peak_that_stands_out(seed: int) -> None:
     _, _, ratio = steps._shift(texture(128, 128, seed), texture(128, 128, seed + 50))
     assert 1.0 <= ratio < 1.6
+
+
+@pytest.mark.parametrize(('apart_px', 'stands_out'), [(6, True), (7, False), (9, False)])
+@pytest.mark.parametrize('axis', [0, 1])
+@pytest.mark.parametrize('sign', [-1, 1])
+def test_a_second_peak_counts_beyond_six_pixels(
+    apart_px: int, stands_out: bool, axis: int, sign: int
+) -> None:
+    ground = texture(128, 128)
+    twice = 0.52 * ground + 0.48 * np.roll(ground, sign * apart_px, axis)
+    _, _, ratio = steps._shift(twice, ground)
+    assert (ratio > 1.6) is stands_out
+
+
+def test_a_displacement_is_the_way_of_the_middles_and_what_is_left_in_the_patches() -> None:
+    ground = texture(160, 160)
+    first, second = ground[16:144, 16:144], ground[20:148, 13:141]
+    found = steps._compare(first, second, np.array([3.0, -2.0]), 64.0, 30.0)
+    assert isinstance(found, Displacement)
+    assert (found.north_m, found.east_m) == pytest.approx((3.0 - 2.0, -2.0 - 1.5), abs=0.05)
 
 
 @pytest.mark.parametrize(('at', 'highest'), [(3, 3.2), (3, 2.6), (0, 0.3), (6, 5.9), (5, 5.0)])
@@ -151,6 +173,12 @@ def test_a_patch_shows_the_ground_north_up(pose: Pose, axis: int) -> None:
     expected = (points[1] if axis == 0 else points[0]) / points[2]
     found = [patch[row, column] for row, column in cells]
     assert found == pytest.approx(list(expected), abs=0.6)
+
+
+def test_where_the_vehicle_is_does_not_count() -> None:
+    view = view_of(texture(256, 256), pitch=8.0)
+    away = replace(view, pose=replace(view.pose, north_m=500.0, east_m=-300.0))
+    np.testing.assert_allclose(steps._middle(away, CAMERA), steps._middle(view, CAMERA))
 
 
 def test_a_patch_is_smoothed_a_little() -> None:
@@ -218,8 +246,10 @@ def test_a_level_camera_moved_by_what_the_picture_moved(moved_px: tuple[int, int
 
 
 @pytest.mark.parametrize('axis', ['roll', 'pitch'])
-@pytest.mark.parametrize('lean', [15.0, 24.0])
-def test_leaning_cameras_are_compared_around_what_both_see(lean: float, axis: str) -> None:
+@pytest.mark.parametrize(('lean', 'other_lean'), [(15.0, -5.0), (24.0, 4.0), (20.0, -10.0)])
+def test_leaning_cameras_are_compared_around_what_both_see(
+    lean: float, other_lean: float, axis: str
+) -> None:
     """Two that lean apart see little of the same ground below them; both stand still."""
     ground = texture(1200, 1200, 8)
     middle, px_per_m = 600.0, 6.0
@@ -234,7 +264,7 @@ def test_leaning_cameras_are_compared_around_what_both_see(lean: float, axis: st
             cv2.warpPerspective(ground, matrix, (256, 256), flags=flags).astype(np.uint8), pose
         )
 
-    found = register(seen(**{axis: lean}), seen(**{axis: lean - 20.0}, yaw=4.0), CAMERA)
+    found = register(seen(**{axis: lean}), seen(**{axis: other_lean}, yaw=4.0), CAMERA)
     assert isinstance(found, Displacement)
     assert hypot(found.north_m, found.east_m) < found.error_m < 0.5
 
@@ -279,6 +309,15 @@ def test_both_altitudes_must_be_known(altitude_m: float) -> None:
     wrong = replace(after, pose=replace(after.pose, altitude_agl_m=altitude_m))
     assert register(before, wrong, CAMERA) is Mismatch.ALTITUDE
     assert register(wrong, before, CAMERA) is Mismatch.ALTITUDE
+    assert register(replace(before, pose=wrong.pose), wrong, CAMERA) is Mismatch.ALTITUDE
+
+
+def test_a_picture_from_less_than_a_metre_is_compared_too() -> None:
+    ground = texture(320, 320)
+    before, after = (view_of(ground[32:288, at : at + 256], 0.9) for at in (32, 44))
+    found = register(before, after, CAMERA)
+    assert isinstance(found, Displacement)
+    assert found.east_m == pytest.approx(12.0 * 0.9 / CAMERA.focal_px, rel=0.05)
 
 
 @pytest.mark.parametrize('lean', [45.5, 95.0])

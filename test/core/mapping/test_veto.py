@@ -6,7 +6,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.mapping import MapParameters, SafetyMap
 
 S = 1_000_000_000
@@ -184,9 +183,3 @@ def test_no_order_of_frames_loses_a_veto(*, camera, look, pose_at, frames):
             clear, open_s = 0, time_s + min(strikes, 5) * small.veto_s
         if kind == 'black' or clear < small.veto_looks or time_s < open_s - 1e-3:
             assert score_at(safety_map) == 0.0
-
-
-def test_ground_that_was_called_unsafe_cannot_count_as_clear():
-    assert MapParameters(neutral_score=0.6, clear_score=0.6).clear_score == 0.6
-    with pytest.raises(ConfigurationError, match='clear_score'):
-        MapParameters(neutral_score=0.8)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from peace_ros.core.domain import Camera, Heatmap, Pose
+from peace_ros.core.domain import Camera, ConfigurationError, Heatmap, Pose
 from peace_ros.core.mapping import MapParameters, SafetyMap
 from peace_ros.core.mapping.projection import Window
 from peace_ros.core.mapping.veto import Veto, blobs
@@ -112,6 +112,27 @@ def test_each_look_makes_the_wait_longer_up_to_five() -> None:
             looks.take(now_s + 0.01 * (each + 1), clear=at((4, 5)))
         assert looks.closed(now_s + wait_s - 0.01) == [(4, 5)]
         assert looks.closed(now_s + wait_s + 0.01) == []
+
+
+def test_a_wait_that_ends_after_the_last_clear_look_is_forgotten_too() -> None:
+    looks = Looks()
+    for begun_s in (0.0, 4.0):
+        looks.take(begun_s, unsafe=at((4, 5)))
+        for number in range(3):
+            looks.take(begun_s + 0.1 * (number + 1), clear=at((4, 5)))
+        assert looks.closed(begun_s + 1.9) == [(4, 5)]
+        assert looks.closed(begun_s + 2.1) == []
+        looks.take(begun_s + 3.0)
+
+
+def test_what_closes_one_cell_prolongs_no_other() -> None:
+    looks = Looks()
+    looks.take(1.0, unsafe=at((4, 5)))
+    looks.take(2.0, unsafe=at((20, 20)))
+    for number in range(3):
+        looks.take(2.1 + 0.1 * number, clear=at((4, 5), (20, 20)))
+    assert looks.closed(2.9) == [(4, 5), (20, 20)]
+    assert looks.closed(3.1) == [(20, 20)]
 
 
 def test_once_open_the_wait_is_short_again() -> None:
@@ -272,3 +293,9 @@ def test_closed_ground_grows_round_with_the_map() -> None:
     disc[np.ix_([0, 4], [0, 1, 3, 4])] = 0
     after = safety_map.layers(S).score[known] == 0.0
     assert np.array_equal(after, cv2.dilate(before, disc) > 0)
+
+
+def test_ground_that_was_called_unsafe_cannot_count_as_clear():
+    assert MapParameters(neutral_score=0.6, clear_score=0.6).clear_score == 0.6
+    with pytest.raises(ConfigurationError, match='clear_score'):
+        MapParameters(neutral_score=0.8)

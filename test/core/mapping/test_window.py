@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from math import cos, radians, tan
+from dataclasses import replace
+from math import cos, degrees, pi, radians, tan
 
 import cv2
 import numpy as np
@@ -17,6 +18,7 @@ from peace_ros.core.mapping.projection import (
     GroundGrid,
     Window,
     project,
+    tilt_rad,
     visible_window,
     worst_part,
 )
@@ -401,3 +403,22 @@ def test_the_reason_of_a_refusal_is_told_in_a_few_words(pose: Pose, fate: str) -
     sentence = 'off the vertical' if 'tilt' in fate else 'or more above ground to project'
     assert sentence in str(refused.value)
     assert safety_map.stamp_ns is None
+
+
+@pytest.mark.parametrize(
+    ('angles', 'tilt_deg'),
+    [
+        ({}, 0.0),
+        ({'yaw': 130.0}, 0.0),
+        ({'roll': 20.0}, 20.0),
+        ({'pitch': -30.0, 'yaw': 50.0}, 30.0),
+        ({'roll': 120.0}, 120.0),
+    ],
+)
+def test_tilt_is_the_angle_off_the_vertical(angles: dict[str, float], tilt_deg: float) -> None:
+    assert degrees(tilt_rad(pose_of(30.0, 0.0, 0.0, **angles))) == pytest.approx(tilt_deg)
+
+
+def test_an_inaccurate_quaternion_upside_down_has_a_tilt() -> None:
+    pose = replace(pose_of(30.0, 0.0, 0.0), quaternion_ned_frd=(0.0, 1.005, 0.0, 0.0))
+    assert tilt_rad(pose) == pi

@@ -129,6 +129,14 @@ def test_what_is_told_counts_half_a_second_later_and_until_then() -> None:
     assert ended[0] == 5.3125
 
 
+def test_a_bias_explains_a_slow_descent_but_no_altitude_that_froze() -> None:
+    told = steady(down=0.4)  # 1.4 m in 3.5 s
+    assert noticed(told, lambda at_s: (4.0, -3.0, 0.075 * at_s - 50.0)) is None
+    found = noticed(told, lambda _: (4.0, -3.0, -50.0))
+    assert found is not None
+    assert 'sink 1.4 m in 3.5 s' in found[1]
+
+
 def test_a_vehicle_that_climbed_has_a_second_more() -> None:
     found = noticed(
         lambda at_s: (0.0, 0.0, -2.0 if at_s < 5.0 else 2.0),

@@ -27,13 +27,13 @@ P = SenderParameters(rate_hz=20.0, limit_s=0.5, handover_s=2.0)
 class Link:
     def __init__(self) -> None:
         self.sent: list[Setpoint] = []
-        self.in_control, self.taken_over = True, False
+        self.in_control, self.taken_over, self.mode_known = True, False, True
         self.holds = 0
         self.answer = RequestResult(Answer.ACCEPTED)
         self.broken = ''
 
     def telemetry(self) -> Telemetry:
-        return Telemetry(received_ns=0, in_control=self.in_control)
+        return Telemetry(received_ns=0, in_control=self.in_control, mode_known=self.mode_known)
 
     def send_velocity(self, setpoint: Setpoint) -> None:
         if self.broken:
@@ -148,6 +148,18 @@ def test_what_was_sent_and_withheld_is_counted(bench: Bench) -> None:
     assert bench.sender.statistics() == SenderStatistics(
         state=SenderState.NOT_IN_CONTROL, sent=3, zeros=2, withheld=4, max_gap_s=0.5
     )
+
+
+def test_nothing_is_sent_while_the_mode_is_not_known(bench: Bench) -> None:
+    bench.sender.submit(FORWARD)
+    bench.link.mode_known = False
+    assert bench.tick(50.0) == []
+    assert bench.state is SenderState.MODE_UNKNOWN
+    bench.link.in_control = False
+    assert bench.tick(50.0) == []
+    assert bench.state is SenderState.NOT_IN_CONTROL
+    bench.link.mode_known = bench.link.in_control = True
+    assert bench.tick(50.0) == [FORWARD]
 
 
 def test_gaps_are_those_within_a_row_of_sending(bench: Bench) -> None:
