@@ -163,7 +163,7 @@ class LandingNode(ManagedNode):
         return was_flying
 
     def cleanup(self) -> None:
-        """Stop the vehicle: zero velocity, then no further set-point; release the connection."""
+        """Stop the vehicle (zero velocity and hold), then send nothing; release the connection."""
         with self._lock:
             if self._sending.stop():
                 self._access.stop_vehicle()
