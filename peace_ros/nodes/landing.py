@@ -149,6 +149,7 @@ class LandingNode(ManagedNode):
             if link is None:
                 return self._access.problem or 'the vehicle is not reached yet'
             self._sending.begin(link)
+            self._sending.submit(Setpoint(stamp_ns=0))  # from now on the dead-man watches
             self._core.engage()
         return ''
 

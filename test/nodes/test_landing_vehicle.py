@@ -109,6 +109,19 @@ def test_a_landing_node_that_is_shut_down_lets_the_autopilot_hold(
     bench.until(lambda: hovering.mode_name in {'BRAKE', 'AUTO.LOITER'}, see, within_s=5.0)
 
 
+def test_a_landing_that_ends_before_its_first_step_lets_the_autopilot_hold(
+    bench, hovering, engaging
+) -> None:
+    see, *_ = engaging()
+    (node,) = bench._nodes
+    bench.until(lambda: not node.check_engagement(), see)
+    assert hovering.mode_name == 'GUIDED'
+    with node._lock:
+        assert node.begin() == ''
+        node.end_landing()
+    bench.until(lambda: hovering.mode_name == 'BRAKE', see, within_s=8.0)
+
+
 def test_after_the_hand_over_it_holds_where_nothing_else_was_asked_for(
     bench, hovering, engaging, values_of
 ) -> None:
