@@ -69,7 +69,7 @@ class DemoOptions:
         Option(
             '--camera',
             metavar='WxH',
-            help='Size of the image; from 704 on it is also seen closer, in parts; takes time.',
+            help='Size of the image; 704x704, 640x480 and more are also seen in parts; takes time.',
         ),
     ] = '352x352'
     fov_deg: Annotated[
