@@ -22,9 +22,22 @@ LEFT_OUT = [f'{NAME}.lab.training', f'{NAME}.lab.training.*']
 DATA_LEFT_OUT = ['ament/*', 'annotations/*']
 
 # ROS looks for launch files and what they name under share/, for nothing else.
-SHARED = ('config/*.yaml', 'config/*.xml', 'config/presets/*.yaml')
+SHARED = (
+    'config/*.yaml',
+    'config/*.xml',
+    'config/presets/*.yaml',
+    'config/rviz/*.rviz',
+    'config/sros2/*.xml',
+)
 
-NODES = ('prompt_generator', 'segmentation', 'landing', 'satellite_view', 'autopilot_sim')
+NODES = (
+    'prompt_generator',
+    'segmentation',
+    'perception',
+    'landing',
+    'satellite_view',
+    'autopilot_sim',
+)
 
 
 def _share() -> list[tuple[str, list[str]]]:
@@ -48,6 +61,7 @@ setup(
     package_data={
         **{f'{NAME}.{folder}': ['**/*'] for folder in SHIPPED},
         f'{NAME}.lab.evaluation.segmentation': ['templates/*.j2'],
+        f'{NAME}.lab.experiment.report': ['templates/*.j2'],
     },
     exclude_package_data={f'{NAME}.config': DATA_LEFT_OUT} if SHIPPED else {},
     data_files=[

@@ -23,7 +23,7 @@ PAGES = {
     'README.md': 'index.md',
     'models/README.md': 'bundled_models.md',
     '.github/CONTRIBUTING.md': 'contributing.md',
-    '.github/SECURITY.md': 'security.md',
+    '.github/SECURITY.md': 'reporting.md',
 }
 """File of the repository -> page of the site."""
 EXAMPLES = 'examples/README.md'

@@ -8,63 +8,149 @@
 
 from __future__ import annotations
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+import os
+import sys
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import EnvironmentVariable
 from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
-from launch_ros.substitutions import FindPackageShare
+
+from peace_ros.core.resources import config_dir
 
 PACKAGE = 'peace_ros'
-ARGUMENTS = (
-    ('preset', 'peace_cs', 'One of dd_cs, d_cs, peace_cs, dd_fs, d_fs, peace_fs'),
-    ('image', 'image', 'Topic of the nadir camera (sensor_msgs/Image)'),
-    ('interface', 'mavlink', 'mavlink, or twist for simulators without MAVLink'),
-    ('mavlink', 'udpin:127.0.0.1:14550', 'Where the autopilot is'),
-    ('pose_source', 'topic', 'With interface twist: topic (the one below) or tf'),
-    ('pose', 'pose', 'With interface twist: topic of the pose (geometry_msgs/PoseStamped)'),
-    ('tf_parent', 'map', 'With pose_source tf: the local frame'),
-    ('tf_child', 'base_link', 'With pose_source tf: the frame of the vehicle'),
-    ('cmd_vel', 'cmd_vel', 'With interface twist: topic of the velocity (geometry_msgs/Twist)'),
-    ('use_sim_time', 'false', 'Take the time from /clock'),
+PRESETS = sorted(path.stem for path in (config_dir() / 'presets').glob('*.yaml'))
+DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+COMPOSED, SEPARATE = 'perception', ('prompt_generator', 'segmentation')
+FAST_DDS = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+RESPAWN_DELAY_S = 2.0
+BOOLEANS = ['true', 'false']
+
+OF_ALL_NODES = {'use_sim_time': bool, 'autostart': bool}
+"""Arguments that are parameters of the nodes, with their types."""
+OF_PERCEPTION = {'image_transport': str}
+OF_LANDING = {
+    'interface': str,
+    'mavlink': str,
+    'dialect': str,
+    'pose_source': str,
+    'tf_parent': str,
+    'tf_child': str,
+    **OF_PERCEPTION,
+}
+TOPICS = ('image', 'camera_info', 'depth', 'pose', 'cmd_vel')
+
+_UNSET = '; empty: as in params_file, or the default of the node'
+ARGUMENTS: tuple[tuple[str, Any, str, list[str] | None], ...] = (
+    ('namespace', '', 'Namespace of the nodes, such as drone_1', None),
+    ('preset', 'peace_cs', 'Prompt and model', PRESETS),
+    ('params_file', '', 'ROS parameter file; its values go before those of the preset', None),
+    ('use_sim_time', 'false', 'Take the time from /clock', BOOLEANS),
+    (
+        'log_level',
+        'info',
+        'Least severity that is logged',
+        ['debug', 'info', 'warn', 'error', 'fatal'],
+    ),
+    ('autostart', 'true', 'Configure and activate the nodes; else a lifecycle manager', BOOLEANS),
+    ('use_composition', 'false', 'Prompt generator and segmentation in one process', BOOLEANS),
+    ('use_respawn', 'false', 'Start a perception node again when it has ended', BOOLEANS),
+    (
+        'discovery_range',
+        EnvironmentVariable(DISCOVERY, default_value='LOCALHOST'),
+        'Who on the network finds the nodes; by default this machine only',
+        ['LOCALHOST', 'SUBNET', 'OFF', 'SYSTEM_DEFAULT'],
+    ),
+    ('image', 'image', 'Topic of the nadir camera (sensor_msgs/Image)', None),
+    ('image_transport', '', f'raw or compressed (JPEG, PNG on image/compressed){_UNSET}', None),
+    ('camera_info', 'camera_info', 'Topic of its calibration (sensor_msgs/CameraInfo)', None),
+    ('depth', 'depth', 'Topic of depth images (sensor_msgs/Image), where there are any', None),
+    ('interface', '', f'mavlink, or twist for simulators without MAVLink{_UNSET}', None),
+    ('mavlink', '', f'Where the autopilot is, such as udpin:0.0.0.0:14550{_UNSET}', None),
+    ('dialect', '', f'Kind of autopilot: auto, ardupilot or px4{_UNSET}', None),
+    ('pose_source', '', f'With interface twist: topic (the one below) or tf{_UNSET}', None),
+    ('pose', 'pose', 'With interface twist: topic of the pose (geometry_msgs/PoseStamped)', None),
+    ('tf_parent', '', f'With pose_source tf: the local frame{_UNSET}', None),
+    ('tf_child', '', f'With pose_source tf: the frame of the vehicle{_UNSET}', None),
+    ('cmd_vel', 'cmd_vel', 'With interface twist: topic of the velocity (Twist)', None),
 )
 
 
-def _text(name: str) -> ParameterValue:
-    return ParameterValue(LaunchConfiguration(name), value_type=str)
+def _refuse_unknown(context: LaunchContext) -> None:
+    """Refuse a misspelt argument; a launch file that includes this one may have others."""
+    names = [name for name, *_ in ARGUMENTS]
+    is_included = Path(__file__).name not in {Path(each).name for each in sys.argv}
+    for argument in context.argv:
+        name, _, _ = argument.partition(':=')
+        near = get_close_matches(name, names, n=1)
+        if name not in names and (near or not is_included):
+            remedy = f'did you mean {near[0]}?' if near else '--show-args lists them'
+            raise RuntimeError(f'launch argument {name} is unknown: {remedy}')
+
+
+def _create_nodes(context: LaunchContext) -> list[Node]:
+    _refuse_unknown(context)
+    given: dict[str, str] = context.launch_configurations
+    files = [str(config_dir() / 'presets' / f'{given["preset"]}.yaml')]
+    if given['params_file']:
+        if not Path(given['params_file']).is_file():
+            raise RuntimeError(
+                f'params_file {given["params_file"]} does not exist: give a ROS parameter file'
+            )
+        files.append(given['params_file'])
+
+    def create(name: str, arguments: dict[str, type], *, respawn: bool) -> Node:
+        chosen = {
+            each: given[each] == 'true' if kind is bool else given[each]
+            for each, kind in {**OF_ALL_NODES, **arguments}.items()
+            if given[each]
+        }
+        return Node(
+            package=PACKAGE,
+            executable=name,
+            # One name would rename both nodes of a composed process.
+            name=None if name == COMPOSED else name,
+            namespace=given['namespace'],
+            output='screen',
+            parameters=[*files, chosen],
+            remappings=[
+                *((topic, given[topic]) for topic in TOPICS),
+                ('image/compressed', f'{given["image"]}/compressed'),
+            ],
+            ros_arguments=['--log-level', given['log_level']],
+            respawn=respawn,
+            respawn_delay=RESPAWN_DELAY_S,
+            additional_env={
+                DISCOVERY: given['discovery_range'],
+                FAST_DDS: os.environ.get(FAST_DDS) or str(config_dir() / 'fastdds.xml'),
+            },
+        )
+
+    respawn = given['use_respawn'] == 'true'
+    composed = given['use_composition'] == 'true'
+    return [
+        *(
+            create(name, OF_PERCEPTION, respawn=respawn)
+            for name in ((COMPOSED,) if composed else SEPARATE)
+        ),
+        # Never again by itself: where it engages automatically, it would after a takeover, too.
+        create('landing', OF_LANDING, respawn=False),
+    ]
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the three nodes with the parameters of the preset."""
-    preset = PathJoinSubstitution(
-        [FindPackageShare(PACKAGE), 'config', 'presets', [LaunchConfiguration('preset'), '.yaml']]
-    )
-    clock = {'use_sim_time': ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)}
-    names = ('interface', 'mavlink', 'pose_source', 'tf_parent', 'tf_child')
-    vehicle = {name: _text(name) for name in names}
-    image = ('image', LaunchConfiguration('image'))
-    topics = [(name, LaunchConfiguration(name)) for name in ('pose', 'cmd_vel')]
-    nodes = (
-        ('prompt_generator', [preset, clock], [image]),
-        ('segmentation', [preset, clock], [image]),
-        ('landing', [preset, clock, vehicle], [image, *topics]),
-    )
+    """Return the arguments and the three nodes with the parameters of the preset."""
     return LaunchDescription(
         [
             *(
-                DeclareLaunchArgument(name, default_value=default, description=meaning)
-                for name, default, meaning in ARGUMENTS
-            ),
-            *(
-                Node(
-                    package=PACKAGE,
-                    executable=name,
-                    name=name,
-                    output='screen',
-                    parameters=parameters,
-                    remappings=remappings,
+                DeclareLaunchArgument(
+                    name, default_value=default, description=meaning, choices=choices
                 )
-                for name, parameters, remappings in nodes
+                for name, default, meaning, choices in ARGUMENTS
             ),
+            OpaqueFunction(function=_create_nodes),
         ]
     )

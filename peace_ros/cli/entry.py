@@ -57,6 +57,11 @@ def segmentation() -> Any:
     return start('peace_ros.nodes.segmentation')
 
 
+def perception() -> Any:
+    """Run prompt generator and segmentation in one process."""
+    return start('peace_ros.nodes.perception')
+
+
 def landing() -> Any:
     """Run the node."""
     return start('peace_ros.nodes.landing')

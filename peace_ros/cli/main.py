@@ -36,6 +36,8 @@ VERBS = {
     'faults': 'Put every fault into a flight of the real processes, and judge what happens.',
     'evaluate': 'Measure on labelled images how safe it is what the heatmaps call safe.',
     'ablate': 'Measure what vocabularies, templates, words, fusion and thresholds are worth.',
+    'experiment': 'Fly many landings in simulated time and judge each by ground truth.',
+    'report': 'Make a page of an experiment: tables, charts, failures with pictures.',
     'words': 'Measure how often CLIP names the weather, light or look of a frame.',
 }
 """Verb -> its line in the help. The function of that name in the module of that name runs it."""
@@ -48,6 +50,13 @@ MODEL_VERBS = {
     'fetch': 'Fetch a named bundle, checked and resumable.',
 }
 """The same for ``peace models``; ``models_<verb>`` in the module ``models`` runs it."""
+WORLD_VERBS = {
+    'draw': 'Draw a world with exact labels.',
+    'tiles': 'Put a world together from web-map tiles.',
+    'info': 'Show size, resolution and labels of a world, or what a cache of tiles holds.',
+    'preview': 'Write a small picture of a world.',
+}
+"""The same for ``peace world``."""
 
 app = typer.Typer(
     name='peace',
@@ -58,6 +67,8 @@ app = typer.Typer(
 )
 models_app = typer.Typer(help='Look at model bundles, make them, fetch them.', no_args_is_help=True)
 app.add_typer(models_app, name='models')
+world_app = typer.Typer(help='Draw worlds, fetch them, look at them.', no_args_is_help=True)
+app.add_typer(world_app, name='world')
 
 _HANDED_ON = {
     'allow_extra_args': True,
@@ -108,6 +119,8 @@ for _name, _summary in VERBS.items():
     _add(app, _name, _summary, _name, _name)
 for _name, _summary in MODEL_VERBS.items():
     _add(models_app, _name, _summary, 'models', f'models_{_name}')
+for _name, _summary in WORLD_VERBS.items():
+    _add(world_app, _name, _summary, 'world', f'world_{_name}')
 
 
 def _show_version(wanted: bool) -> None:

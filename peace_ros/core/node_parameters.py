@@ -27,6 +27,17 @@ _TRANSPORTS = ('raw', 'compressed')
 
 
 @dataclass(frozen=True)
+class LifecycleOptions(ParameterSet):
+    """Options of every node that flies."""
+
+    autostart: bool = parameter(
+        True,
+        'Configure and activate the node when it starts; off: a lifecycle manager or '
+        'ros2 lifecycle does it',
+    )
+
+
+@dataclass(frozen=True)
 class PromptGeneratorOptions(ParameterSet):
     """Options of the prompt_generator node."""
 
@@ -46,6 +57,7 @@ class SegmentationOptions(ParameterSet):
         'PEACE',
         'That of the prompt generator; a static one (DD, D, a sentence with {term} only) is used '
         'as it is, without prompts from a topic',
+        live=True,
     )
     prompt_timeout: float = parameter(
         0.3,
@@ -54,11 +66,12 @@ class SegmentationOptions(ParameterSet):
         unit='s',
         low=0.0,
         high=10.0,
+        live=True,
     )
     overlay_threshold: float = parameter(
-        0.5, 'Score from which the overlay shows a pixel as safe', low=0.0, high=1.0
+        0.5, 'Score from which the overlay shows a pixel as safe', low=0.0, high=1.0, live=True
     )
-    overlay_quality: int = parameter(80, 'JPEG quality of the overlay', low=1, high=100)
+    overlay_quality: int = parameter(80, 'JPEG quality of the overlay', low=1, high=100, live=True)
 
 
 @dataclass(frozen=True)
@@ -156,6 +169,9 @@ class LandingOptions(ParameterSet):
     )
     tf_parent: str = parameter('map', 'Local frame (ENU) of the pose in tf')
     tf_child: str = parameter('base_link', 'Frame of the vehicle in tf')
+    publish_tf: bool = parameter(
+        False, 'Publish tf_parent -> tf_child, where nothing else does (needs tf2_msgs)'
+    )
     mount_source: str = parameter(
         'parameters',
         'How the camera is mounted: by the parameters mount_*, or by /tf_static from tf_child to '
@@ -172,18 +188,24 @@ def groups_of(node: str) -> tuple[Group, ...]:
     if node == 'prompt_generator':
         from peace_ros.core.prompting import PromptingParameters
 
-        return ('', PromptingParameters), ('', PromptGeneratorOptions)
+        return ('', PromptingParameters), ('', PromptGeneratorOptions), ('', LifecycleOptions)
     if node == 'segmentation':
         from peace_ros.core.segmentation import FAMILIES, SegmentationParameters
 
         families = [('', family.parameters) for family in FAMILIES.values()]
-        return ('', SegmentationParameters), *families, ('', SegmentationOptions)
+        return (
+            ('', SegmentationParameters),
+            *families,
+            ('', SegmentationOptions),
+            ('', LifecycleOptions),
+        )
     if node == 'landing':
         from peace_ros.core.landing import LandingParameters
         from peace_ros.core.mapping import MapParameters
         from peace_ros.core.vehicle import SenderParameters, VehicleParameters
 
         return (
+            ('', LifecycleOptions),
             ('', LandingOptions),
             ('', CameraOptions),
             ('', LandingParameters),

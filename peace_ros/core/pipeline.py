@@ -21,7 +21,12 @@ from peace_ros.core.inference import Bundle, ClipEncoder
 from peace_ros.core.landing import LandingCore, LandingParameters
 from peace_ros.core.mapping import MapParameters
 from peace_ros.core.presets import DEFAULT_PRESET, Preset, load_preset
-from peace_ros.core.prompting import PromptGenerator, PromptingParameters, load_vocabularies
+from peace_ros.core.prompting import (
+    Encoder,
+    PromptGenerator,
+    PromptingParameters,
+    load_vocabularies,
+)
 from peace_ros.core.segmentation import (
     CameraWatch,
     Log,
@@ -141,12 +146,15 @@ def segmentation_of(preset: Preset, **given: Any) -> tuple[SegmentationParameter
     return common, preset.fill('segmentation', family_of(common).parameters, **given)
 
 
-def create_generator(parameters: PromptingParameters, log: Log = _LOG) -> PromptGenerator:
+def create_generator(
+    parameters: PromptingParameters, log: Log = _LOG, encoder: Encoder | None = None
+) -> PromptGenerator:
     """Make the prompt generator; a static template needs neither a model nor vocabularies.
 
     Args:
         parameters: of the prompts.
         log: gets a line about the model.
+        encoder: in place of loading the bundle.
 
     Raises:
         PeaceError: vocabularies or bundle cannot be used.
@@ -154,6 +162,8 @@ def create_generator(parameters: PromptingParameters, log: Log = _LOG) -> Prompt
     if parameters.is_static:
         return PromptGenerator(None, None, parameters)
     vocabularies = load_vocabularies(parameters.vocabularies)
+    if encoder is not None:
+        return PromptGenerator(encoder, vocabularies, parameters)
     encoder = ClipEncoder(
         Bundle.load(parameters.bundle),
         threads=parameters.threads,

@@ -111,6 +111,18 @@ def read_sections(path: Path) -> Sections:
     return {section: _flat(values) for section, values in sections.items()}
 
 
+def addresses(section: str, node: str) -> bool:
+    """Return whether ROS gives the parameters of a section to a node.
+
+    Args:
+        section: as in the file, such as ``landing``, ``/drone/landing`` or ``/**/landing``.
+        node: its name with namespace, such as ``/drone/landing``.
+    """
+    path = re.escape('/' + section.removeprefix('/'))
+    pattern = path.replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
+    return re.fullmatch(pattern, node) is not None
+
+
 def _sections_of(content: Mapping[str, Any], namespace: str = '') -> Iterator[tuple[str, Any]]:
     """Yield section and what it holds; a namespace holds further sections."""
     for name, section in content.items():

@@ -33,9 +33,10 @@ _INTRODUCTION = """\
 # Parameters
 
 Written by `python -m peace_ros.lab.parameter_docs`; a test keeps this table, the dataclasses and
-`config/defaults.yaml` equal. All parameters are read-only: they are given when a node starts, by
-`--params-file FILE` or `-p name:=value` after `--ros-args`. A value of another type, outside its
-bounds, or of a name that does not exist ends the node with one sentence and exit status 2. Besides
+`config/defaults.yaml` equal. Parameters are given when a node starts, by
+`--params-file FILE` or `-p name:=value` after `--ros-args`. Those marked (live) may change while it
+runs (`ros2 param set`), all others are read-only. A value of another type, outside its bounds, or
+of a name that does not exist ends the node with one sentence and exit status 2. Besides
 these, every node knows ROS's own `use_sim_time`, and image subscriptions know `qos_overrides`.
 """
 _LICENCE = """\
@@ -62,7 +63,7 @@ def defaults_yaml() -> str:
     """Return config/defaults.yaml: a ROS parameter file with a comment before each value."""
     parts = [_LICENCE]
     for node, groups in NODE_PARAMETERS.items():
-        parts.append(f'\n{node}:\n  ros__parameters:\n')
+        parts.append(f'\n/**/{node}:\n  ros__parameters:\n')
         section = ''
         for group, parameters in groups:
             if group != section:
@@ -74,7 +75,7 @@ def defaults_yaml() -> str:
 
 
 def _row(name: str, info: ParameterInfo) -> str:
-    meaning = info.description.rstrip('.').replace('|', '\\|')
+    meaning = info.description.rstrip('.').replace('|', '\\|') + (' (live)' if info.live else '')
     cells = (f'`{name}`', f'`{_scalar(info.default)}`', info.unit, allowed(info), meaning)
     return f'| {" | ".join(cells)} |\n'
 

@@ -5,14 +5,24 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
+from math import inf
 
-from peace_ros.core.domain import VehicleError
+from peace_ros.core.domain import Telemetry, VehicleError
 from peace_ros.core.threads import GuardedThread, OnDefect
 from peace_ros.core.vehicle import VehicleLink
 
 _RETRY_S = 1.0
 _JOIN_S = 1.0
+
+
+def newest_telemetry(link: VehicleLink | None) -> tuple[Telemetry | None, float]:
+    """Return what the vehicle last said and how old (s) it is; None and infinite before."""
+    told = None if link is None else link.telemetry()
+    if told is None or told.received_ns == 0:
+        return None, inf
+    return told, (time.monotonic_ns() - told.received_ns) / 1e9
 
 
 class Connection:

@@ -22,11 +22,12 @@ from peace_ros.core.messages import (
     frame_from_message,
     heatmap_from_image,
     is_rectified,
+    stamp_ns_of,
 )
 from peace_ros.core.node_parameters import LandingOptions
 from peace_ros.core.transforms import StaticTransforms
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import IMAGE_IN, LATCHED_IN, RESULT
-from peace_ros.nodes.runtime import PeaceNode
 
 FRAME_INFO = 'heatmap/frame_info'
 """CameraInfo of the frame that the heatmap of this stamp covers: its size is that of the frame, and
@@ -118,6 +119,7 @@ class LandingInputs:
         self._frame_infos: deque[CameraInfo] = deque(maxlen=_FRAME_INFOS)
         self._depths: deque[Image] = deque(maxlen=_WAITING)
         self._images: deque[ImageMessage] = deque(maxlen=_WAITING)
+        self._heatmap_arrived = node.diagnostics.watch('heatmap')
         node.create_subscription(Image, 'heatmap', self._on_heatmap, IMAGE_IN)
         node.create_subscription(CameraInfo, FRAME_INFO, self._on_frame_info, RESULT)
         node.create_subscription(Image, 'depth', self._on_depth, IMAGE_IN)
@@ -130,6 +132,7 @@ class LandingInputs:
             subscribe_images(node, options.image_transport, self._on_image)
 
     def _on_heatmap(self, message: Image) -> None:
+        self._heatmap_arrived(stamp_ns_of(message))
         self._heatmaps.append(message)
 
     def _on_frame_info(self, message: CameraInfo) -> None:

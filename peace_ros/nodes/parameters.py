@@ -2,21 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """ROS parameters declared from the dataclasses that hold them.
 
-All parameters are read-only: a node is configured when it starts, and a flight is not the time
-to change it.
+Parameters are read-only, but for those that are declared as live: most of a node is configured when
+it starts, and a flight is not the time to change it.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from sys import float_info
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
+from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.domain.parameters import ParameterInfo, describe
 from peace_ros.core.node_parameters import (
     Group,
@@ -27,7 +30,7 @@ from peace_ros.core.node_parameters import (
     ros_name,
     unknown_name,
 )
-from peace_ros.core.yaml_files import WILDCARDS, read_sections
+from peace_ros.core.yaml_files import WILDCARDS, addresses, read_sections
 
 _Parameters = TypeVar('_Parameters')
 
@@ -64,6 +67,31 @@ def declare_parameters(node: Node, parameters: type[_Parameters], group: str = '
     return filled
 
 
+def changed_parameters(
+    filled: Mapping[type[Any], Any], groups: Sequence[Group], given: Mapping[str, Any]
+) -> dict[type[Any], Any]:
+    """Return the dataclasses in which a value changes, with the new values.
+
+    Args:
+        filled: the dataclasses so far.
+        groups: their names.
+        given: ROS name -> new value; names of others (``use_sim_time``) are passed over.
+
+    Raises:
+        ConfigurationError: a value of another type or outside its bounds.
+    """
+    changed = {}
+    for group, parameters in groups:
+        values = {
+            info.name: converted(name, info, given[name])
+            for info in describe(parameters)
+            if (name := ros_name(group, info)) in given
+        }
+        if values:
+            changed[parameters] = replace(filled[parameters], **values)
+    return changed
+
+
 def refuse_unknown(node: Node, *groups: Group) -> None:
     """Refuse values of unknown parameters; sections for all nodes may hold those of other nodes.
 
@@ -82,6 +110,29 @@ def refuse_unknown(node: Node, *groups: Group) -> None:
         node.get_logger().info(f'parameter {name} of section {foreign[name]} is left to others')
 
 
+def refuse_files_for_others(node: Node, kind: str) -> None:
+    """Refuse a parameter file that is for this kind of node and, by its sections, not for this one.
+
+    ROS would ignore it without a word, and the defaults would fly.
+
+    Args:
+        node: with its namespace, and the name that it runs under.
+        kind: its name where nobody renames it.
+
+    Raises:
+        ConfigurationError: there is such a file.
+    """
+    name = node.get_fully_qualified_name()
+    for option, path in pairwise(sys.argv):
+        sections = read_sections(Path(path)) if option == _FILE else ()
+        meant = [each for each in sections if each.rpartition('/')[2] == kind]
+        if meant and not any(addresses(each, name) for each in sections if each not in WILDCARDS):
+            raise ConfigurationError(
+                f'{path}: section {meant[0]} is not for node {name}, and would be ignored: name '
+                f'the section /**/{node.get_name()}'
+            )
+
+
 def _only_in_wildcards(arguments: list[str], node: str) -> dict[str, str]:
     """Return parameter -> section, of what parameter files give to all nodes and not to this."""
     wild: dict[str, str] = {}
@@ -96,9 +147,11 @@ def _only_in_wildcards(arguments: list[str], node: str) -> dict[str, str]:
 
 
 def descriptor_of(info: ParameterInfo) -> ParameterDescriptor:
-    """Return the ROS descriptor of a parameter: meaning, unit, bounds; always read-only."""
+    """Return the ROS descriptor of a parameter: meaning, unit, bounds, whether it is live."""
     unit = f' [{info.unit}]' if info.unit else ''
-    descriptor = ParameterDescriptor(description=f'{info.description}{unit}', read_only=True)
+    descriptor = ParameterDescriptor(
+        description=f'{info.description}{unit}', read_only=not info.live
+    )
     if info.choices:
         descriptor.additional_constraints = f'one of: {", ".join(info.choices)}'
     if isinstance(info.default, bool) or (info.low is None and info.high is None):

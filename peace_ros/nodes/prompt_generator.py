@@ -6,31 +6,40 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from peace_ros.core.domain import PeaceError
-from peace_ros.core.messages import frame_from_message
+from peace_ros.core.domain import Health, Level, PeaceError
+from peace_ros.core.health import WorkHealth
+from peace_ros.core.messages import stamp_ns_of
 from peace_ros.core.node_parameters import PromptGeneratorOptions, groups_of
 from peace_ros.core.pipeline import create_generator
 from peace_ros.core.prompting import PromptGenerator, PromptingParameters, resolve_template
 from peace_ros.nodes.inputs import ImageMessage, subscribe_images
-from peace_ros.nodes.messages import ERROR, OK, diagnostic_array, prompt_to_message
+from peace_ros.nodes.managed import ManagedNode
+from peace_ros.nodes.messages import prompt_to_message
 from peace_ros.nodes.qos import RESULT
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.runtime import run
+from peace_ros.nodes.sharing import SharedImages
 from peace_ros.nodes.worker import NewestWorker
 
 
-class PromptGeneratorNode(PeaceNode):
+class PromptGeneratorNode(ManagedNode):
     """Describes the newest frame in words."""
 
-    def __init__(self, generator: PromptGenerator | None = None, **options: Any) -> None:
+    def __init__(
+        self,
+        generator: PromptGenerator | None = None,
+        images: SharedImages | None = None,
+        **options: Any,
+    ) -> None:
         """Load the model and subscribe.
 
         Args:
             generator: in place of the one that the parameters describe.
+            images: which another node of this process subscribes to; None: this one does.
             options: of rclpy's Node.
 
         Raises:
@@ -38,20 +47,53 @@ class PromptGeneratorNode(PeaceNode):
 
         """
         super().__init__('prompt_generator', *groups_of('prompt_generator'), **options)
+        self._given, self._shared = generator, images
+        self._images = images or SharedImages()
+        self.start()
+
+    def configure(self) -> None:
+        """Load the model and subscribe."""
         parameters = self.filled(PromptingParameters)
-        self._generator = generator or create_generator(parameters, self.get_logger())
+        self._generator = self._given or create_generator(parameters, self.get_logger())
         self._last_template = ''
         self._prompt_out = self.create_publisher(DiagnosticArray, 'prompt', RESULT)
-        self._diagnostics_out = self.create_publisher(DiagnosticArray, '/diagnostics', RESULT)
-        self._worker = NewestWorker(self._generate, self._complain, self.fail, 'prompt_generator')
-        subscribe_images(
-            self, self.filled(PromptGeneratorOptions).image_transport, self._worker.offer
-        )
+        self._image_arrived = self.diagnostics.watch('image')
+        self._work = WorkHealth()
+        self.diagnostics.add('prompts', self._work.take)
+        if self._shared is None:
+            transport = self.filled(PromptGeneratorOptions).image_transport
+            subscribe_images(self, transport, self._images.offer)
         self.get_logger().info(f'ready: template {resolve_template(parameters.template)!r}')
+
+    def activate(self) -> None:
+        """Begin to describe frames."""
+        self._worker = NewestWorker(self._generate, self._complain, self.fail, 'prompt_generator')
+        self._images.add(self._on_image)
+
+    def deactivate(self) -> None:
+        """Describe no further frame."""
+        self._images.remove(self._on_image)
+        self._worker.close()
+
+    def cleanup(self) -> None:
+        """Free the model."""
+        self._generator = PromptGenerator(None, None, PromptingParameters(template='DD'))
+
+    def change(self, filled: Mapping[type[Any], Any]) -> None:
+        """Use another template, vocabularies or way of ranking from the next frame on."""
+        parameters: PromptingParameters = filled[PromptingParameters]
+        if parameters != self.filled(PromptingParameters):
+            self._generator = create_generator(
+                parameters, self.get_logger(), self._generator.encoder
+            )
+
+    def _on_image(self, message: ImageMessage) -> None:
+        self._image_arrived(stamp_ns_of(message))
+        self._worker.offer(message)
 
     def _generate(self, message: ImageMessage) -> None:
         began = time.monotonic()
-        prompt = self._generator.generate(frame_from_message(message))
+        prompt = self._generator.generate(self._images.frame(message))
         self._prompt_out.publish(prompt_to_message(prompt))
         if prompt.template != self._last_template:
             self._last_template = prompt.template
@@ -62,19 +104,11 @@ class PromptGeneratorNode(PeaceNode):
             ('work_s', f'{time.monotonic() - began:.3f}'),
             ('dropped_frames', str(self._worker.dropped)),
         )
-        self._diagnostics_out.publish(
-            diagnostic_array(prompt.stamp_ns, 'prompt_generator', OK, 'running', values)
-        )
+        self._work.put(Health(Level.OK, 'running', values))
 
     def _complain(self, error: PeaceError) -> None:
         self.say(type(error).__name__, f'no prompt for this frame: {error}')
-        self._diagnostics_out.publish(
-            diagnostic_array(self.clock_ns(), 'prompt_generator', ERROR, str(error), ())
-        )
-
-    def close(self) -> None:
-        """Stop the worker."""
-        self._worker.close()
+        self._work.put(Health(Level.ERROR, str(error)))
 
 
 def main(args: Sequence[str] | None = None) -> int:

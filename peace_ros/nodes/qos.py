@@ -33,5 +33,8 @@ RESULT = QoSProfile(depth=10)
 COMMAND = QoSProfile(depth=1)
 """Velocity commands: only the newest has a meaning."""
 
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Maps: who comes late gets the last one."""
+
 CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """/clock, as rclpy subscribes to it."""

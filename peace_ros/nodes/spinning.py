@@ -16,15 +16,16 @@ from peace_ros.core.threads import GuardedThread
 from peace_ros.nodes.failure import EXIT_FAILED
 
 if TYPE_CHECKING:
-    from peace_ros.nodes.runtime import PeaceNode
+    from peace_ros.nodes.node import PeaceNode
 
 _SHUTDOWN_S = 2.0
 
 
-def spin_until_ended(node: PeaceNode) -> None:
+def spin_until_ended(node: PeaceNode, *others: PeaceNode) -> None:
     """Spin in a thread, because Python runs signal handlers only while its main thread is free."""
     executor = SingleThreadedExecutor()
-    executor.add_node(node)
+    for each in (node, *others):
+        executor.add_node(each)
     ended = threading.Event()
 
     def spin() -> None:
@@ -35,13 +36,14 @@ def spin_until_ended(node: PeaceNode) -> None:
 
     spinner = GuardedThread(spin, 'spin', node.fail)
     spinner.start()
-    node.wait_until_ended()
+    node.wait_until_ended(*others)
     # First no new callbacks, then links closed, so that the one under way soon ends, and only then
     # may anything be destroyed.
     ended.set()
     executor.create_task(lambda: None)  # spin_once() returns after it
     spinner.join(timeout=_SHUTDOWN_S)
-    node.close()
+    for each in (node, *others):
+        each.close()
     spinner.join(timeout=_SHUTDOWN_S)
     if spinner.is_alive():
         print('a callback does not end: the process ends without it', file=sys.stderr, flush=True)

@@ -12,7 +12,7 @@ from geometry_msgs.msg import PointStamped, TwistStamped
 from rclpy.node import Node
 
 from peace_ros.core.domain import Telemetry
-from peace_ros.core.landing import SILENT_STATES, Decision, State
+from peace_ros.core.landing import CONCERNING_STATES, SILENT_STATES, Decision, State
 from peace_ros.core.landing.pairs import decision_pairs
 from peace_ros.core.vehicle import VehicleLink
 from peace_ros.nodes.messages import (
@@ -31,9 +31,6 @@ _STATUS_PERIOD_S = 0.1
 _LAST_WORDS = 5
 """A subscriber may miss one message of a process that ends."""
 _LAST_WORDS_PERIOD_S = 0.04
-_CONCERNING = frozenset(
-    {State.WAITING, State.CLIMBING, State.RESTARTING, State.RETURNING, State.HOLD}
-)
 
 
 @dataclass(frozen=True)
@@ -94,7 +91,7 @@ def status_message(decision: Decision, situation: VehicleSituation, at_ns: int) 
     state = State.HOLD if situation.problem else decision.state
     after = f'handed over: {situation.stage}' if situation.stage else ''
     reason = situation.problem or (after if state is State.HANDOVER else '') or decision.reason
-    level = ERROR if state is State.ABORTED else WARN if state in _CONCERNING else OK
+    level = ERROR if state is State.ABORTED else WARN if state in CONCERNING_STATES else OK
     told = situation.telemetry
     pairs = {
         **decision_pairs(decision, None if told is None else told.pose),

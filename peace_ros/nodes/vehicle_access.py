@@ -20,8 +20,8 @@ from peace_ros.core.vehicle import VehicleLink, VehicleParameters, check_access,
 from peace_ros.nodes.connection import Connection
 from peace_ros.nodes.handover import AfterHandover
 from peace_ros.nodes.inputs import tf_message
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import COMMAND, POSE_IN
-from peace_ros.nodes.runtime import PeaceNode
 from peace_ros.nodes.twist_link import TwistLink
 
 _TRY_S = 3.0

@@ -21,6 +21,7 @@ _LOWEST_M = 0.2
 """The lens of a vehicle that stands on the ground is about this high."""
 _SKY_RGB = (168, 176, 184)
 _HORIZON = 1e-9
+_COARSEST = 16
 _CHECKED = 16
 """One of so many rows is projected back, to see that the distortion could be inverted."""
 _INVERSION_PX = 0.01
@@ -40,6 +41,24 @@ class CameraView(NamedTuple):
     """Some of the ground in view lies beyond the world, which is continued by mirroring."""
 
 
+class LabelSquare(NamedTuple):
+    """Ground truth around a place."""
+
+    labels: NDArray[np.uint8]
+    """Rows (to the south) x columns (to the east)."""
+    away_m: NDArray[np.float64]
+    """Distance of each pixel from the place, same shape."""
+
+
+class SeenWorld(NamedTuple):
+    """The whole world at one resolution, which may differ between image and labels."""
+
+    image: NDArray[np.uint8]
+    """Height x width x 3."""
+    labels: NDArray[np.uint8] | None
+    """Height x width."""
+
+
 class NadirCamera:
     """A camera over a world, with true attitude: nadir by default, or mounted otherwise.
 
@@ -55,13 +74,7 @@ class NadirCamera:
         self.camera = camera
         self.mount = mount
         self._directions = None if camera.distortion is None else _directions(camera)
-        self._levels = [np.ascontiguousarray(world.image_rgb)]
-        while min(self._levels[-1].shape[:2]) >= 4:
-            height, width = self._levels[-1].shape[:2]
-            size = ((width + 1) // 2, (height + 1) // 2)
-            self._levels.append(
-                np.asarray(cv2.resize(self._levels[-1], size, interpolation=cv2.INTER_AREA))
-            )
+        self._levels = self._reduced()
         self._clearance_px: NDArray[np.float32] | None = None
 
     def view(self, pose: Pose) -> CameraView:
@@ -80,13 +93,13 @@ class NadirCamera:
         corners, depth_sign = self._corners(world_from_image)
         sees_sky = bool((depth_sign <= _HORIZON).any())
         mirrored = sees_sky or not self._inside(corners)
-        level = self._level(world_from_image)
-        image = self._warp(
-            self._levels[level], self._to_level(level) @ world_from_image, cv2.INTER_LINEAR
-        )
+        ground = self._ground(self._level(world_from_image), corners)
+        image_from_view = self._scaled(ground.image) @ world_from_image
+        image = self._warp(ground.image, image_from_view, cv2.INTER_LINEAR)
         labels = None
-        if self.world.labels is not None:
-            labels = self._warp(self.world.labels, world_from_image, cv2.INTER_NEAREST)
+        if ground.labels is not None:
+            labels_from_view = self._scaled(ground.labels) @ world_from_image
+            labels = self._warp(ground.labels, labels_from_view, cv2.INTER_NEAREST)
         if sees_sky:
             sky = self._sky(world_from_image)
             image[sky] = _SKY_RGB
@@ -109,19 +122,22 @@ class NadirCamera:
         height, width = self.world.image_rgb.shape[:2]
         beyond = (u < -0.5) | (v < -0.5) | (u > width - 0.5) | (v > height - 0.5)
         level = self._level(world_from_camera @ np.linalg.inv(self.camera.matrix))
-        (sx, _, tx), (_, sy, ty), _ = self._to_level(level)
-        at_level = (u * np.float32(sx) + np.float32(tx), v * np.float32(sy) + np.float32(ty))
-        image = cv2.remap(
-            self._levels[level], *at_level, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT
-        )
+        seen_px = np.stack([u[~sky], v[~sky]], axis=1) if not sky.all() else np.zeros((1, 2))
+        ground = self._ground(level, seen_px.astype(np.float64))
+
+        def sampled(raster: NDArray[np.uint8], method: int) -> NDArray[np.uint8]:
+            (sx, _, tx), (_, sy, ty), _ = self._scaled(raster)
+            at = (u * np.float32(sx) + np.float32(tx), v * np.float32(sy) + np.float32(ty))
+            found = cv2.remap(raster, *at, method, borderMode=cv2.BORDER_REFLECT)
+            return np.asarray(found, np.uint8)
+
+        image = sampled(ground.image, cv2.INTER_LINEAR)
         image[sky] = _SKY_RGB
         labels = None
-        if self.world.labels is not None:
-            labels = cv2.remap(
-                self.world.labels, u, v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REFLECT
-            )
+        if ground.labels is not None:
+            labels = sampled(ground.labels, cv2.INTER_NEAREST)
             labels[sky] = Label.UNLABELED
-        return CameraView(np.asarray(image, np.uint8), labels, bool((sky | beyond).any()))
+        return CameraView(image, labels, bool((sky | beyond).any()))
 
     def labels_at(self, north_m: float, east_m: float, radius_m: float) -> NDArray[np.uint8] | None:
         """Return the labels (N,) of the pixels whose centres lie within a radius of a place.
@@ -129,20 +145,18 @@ class NadirCamera:
         At least the nearest pixel is returned; None where the world has no labels. Beyond the
         world its mirror image counts.
         """
+        square = self.labels_around(north_m, east_m, radius_m)
+        return None if square is None else square.labels[square.away_m <= radius_m]
+
+    def labels_around(self, north_m: float, east_m: float, radius_m: float) -> LabelSquare | None:
+        """Return the labels of the square that holds a circle, at least of the nearest pixel.
+
+        None where the world has no labels. Beyond the world its mirror image counts.
+        """
         labels = self.world.labels
         if labels is None:
             return None
-        column, row = self.world.pixel(north_m, east_m)
-        reach = radius_m / self.world.gsd_m
-        columns = np.arange(np.ceil(column - reach), np.floor(column + reach) + 1.0)
-        rows = np.arange(np.ceil(row - reach), np.floor(row + reach) + 1.0)
-        near = np.hypot(columns[None, :] - column, rows[:, None] - row) <= reach
-        if not near.any():
-            columns, rows = np.array([round(column)]), np.array([round(row)])
-            near = np.ones((1, 1), np.bool_)
-        height, width = labels.shape
-        found = labels[np.ix_(_mirrored(rows, height), _mirrored(columns, width))]
-        return np.asarray(found[near], np.uint8)
+        return label_square(labels, self.world.pixel(north_m, east_m), radius_m, self.world.gsd_m)
 
     def clearance_m(self, north_m: float, east_m: float) -> float | None:
         """Return the distance to the nearest pixel that is not safe (UNLABELED is not).
@@ -165,9 +179,27 @@ class NadirCamera:
                 )
         column, row = self.world.pixel(north_m, east_m)
         height, width = labels.shape
-        at_row = int(_mirrored(np.array([round(row)]), height)[0])
-        at_column = int(_mirrored(np.array([round(column)]), width)[0])
+        at_row = int(mirrored(np.array([round(row)]), height)[0])
+        at_column = int(mirrored(np.array([round(column)]), width)[0])
         return float(self._clearance_px[at_row, at_column]) * self.world.gsd_m
+
+    def _ground(self, level: int, _corners_px: NDArray[np.float64]) -> SeenWorld:
+        """Return what a view shows.
+
+        Args:
+            level: the world is seen at this many halvings of its resolution.
+            _corners_px: of the view, in pixels of the world (N, 2: column, row).
+        """
+        return SeenWorld(self._levels[min(level, len(self._levels) - 1)], self.world.labels)
+
+    def _reduced(self) -> list[NDArray[np.uint8]]:
+        """Return the world at several resolutions, the finest first."""
+        levels = [np.ascontiguousarray(self.world.image_rgb)]
+        while min(levels[-1].shape[:2]) >= 4:
+            height, width = levels[-1].shape[:2]
+            size = ((width + 1) // 2, (height + 1) // 2)
+            levels.append(np.asarray(cv2.resize(levels[-1], size, interpolation=cv2.INTER_AREA)))
+        return levels
 
     def _world_from_ground(self) -> NDArray[np.float64]:
         """Return the matrix from (north, east, 1) to (column, row, 1) of the world."""
@@ -199,13 +231,14 @@ class NadirCamera:
         cu, cv = self.camera.centre_px
         centre = world_from_image @ (cu, cv, 1.0)
         if centre[2] <= _HORIZON:
-            return len(self._levels) - 1
+            return _COARSEST
         # Determinant of the derivative of a homography: world pixels per view pixel, squared.
         area = abs(float(np.linalg.det(world_from_image))) / float(centre[2]) ** 3
-        return int(np.clip(round(0.5 * log2(max(area, 1e-12))), 0, len(self._levels) - 1))
+        return int(np.clip(round(0.5 * log2(max(area, 1e-12))), 0, _COARSEST))
 
-    def _to_level(self, level: int) -> NDArray[np.float64]:
-        full, small = self._levels[0].shape, self._levels[level].shape
+    def _scaled(self, raster: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Return the matrix from pixels of the world to those of a raster of the same ground."""
+        full, small = self.world.image_rgb.shape, raster.shape
         sx, sy = small[1] / full[1], small[0] / full[0]
         return np.array([[sx, 0, 0.5 * sx - 0.5], [0, sy, 0.5 * sy - 0.5], [0, 0, 1]])
 
@@ -227,6 +260,28 @@ class NadirCamera:
         v = np.arange(self.camera.height_px)[:, None]
         a, b, c = world_from_image[2]
         return np.asarray(a * u + b * v + c <= _HORIZON, np.bool_)
+
+
+def label_square(
+    labels: NDArray[np.uint8], place_px: tuple[float, float], radius_m: float, gsd_m: float
+) -> LabelSquare:
+    """Cut the square that holds a circle out of a label raster, at least the nearest pixel.
+
+    Args:
+        labels: height x width; beyond it its mirror image counts.
+        place_px: column and row of the place.
+        radius_m: of the circle.
+        gsd_m: metres per pixel.
+    """
+    (column, row), reach = place_px, radius_m / gsd_m
+    columns = np.arange(np.ceil(column - reach), np.floor(column + reach) + 1.0)
+    rows = np.arange(np.ceil(row - reach), np.floor(row + reach) + 1.0)
+    away = np.hypot(columns[None, :] - column, rows[:, None] - row)
+    if not (away <= reach).any():
+        columns, rows, away = np.array([round(column)]), np.array([round(row)]), np.zeros((1, 1))
+    height, width = labels.shape
+    found = labels[np.ix_(mirrored(rows, height), mirrored(columns, width))]
+    return LabelSquare(found, away * gsd_m)
 
 
 def _directions(camera: Camera) -> NDArray[np.float64]:
@@ -272,7 +327,7 @@ def _distorted(camera: Camera, directions: NDArray[np.float64]) -> NDArray[np.fl
     return np.asarray(seen, np.float64).reshape(-1, 2)
 
 
-def _mirrored(index: NDArray[np.float64], size: int) -> NDArray[np.intp]:
+def mirrored(index: NDArray[np.float64], size: int) -> NDArray[np.intp]:
     """Fold pixel numbers into 0 .. size - 1 as BORDER_REFLECT does (edge pixel repeated)."""
     folded = np.mod(index.astype(np.int64), 2 * size)
     return np.asarray(np.where(folded < size, folded, 2 * size - 1 - folded), np.intp)

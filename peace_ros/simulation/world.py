@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import Label, WorldError
-from peace_ros.simulation.drawing.town import draw_town
+from peace_ros.simulation.drawing.town import MIXED, draw_town
 from peace_ros.simulation.rasters import check_size, read_gsd_m, read_indices, read_photo
 
 
@@ -68,13 +68,32 @@ class World:
         return north, east
 
 
-def draw_world(seed: int, size_m: float = 400.0, gsd_m: float = 0.1) -> World:
+def draw_world(
+    seed: int,
+    size_m: float = 400.0,
+    gsd_m: float = 0.1,
+    district: str = MIXED,
+    season: str = '',
+) -> World:
     """Draw a town with fields, parks, a river and everything between, with exact labels.
 
     Args:
         seed: 0 or more; the same seed gives the same world.
         size_m: side of the square in metres, 60 to 2000.
         gsd_m: ground sampling distance in metres per pixel, 0.05 to 2.
+        district: what it is made of, one of DISTRICTS.
+        season: spring, summer, autumn or winter; empty lets the seed choose.
+
+    Raises:
+        WorldError: an argument is out of its range, or the image would be too large.
+    """
+    name, size_px = check_drawn(seed, size_m, gsd_m)
+    image, labels = draw_town(seed, size_px, gsd_m, district, season)
+    return World(image, labels, gsd_m, name)
+
+
+def check_drawn(seed: int, size_m: float, gsd_m: float) -> tuple[str, int]:
+    """Return the name and the size in pixels of a drawn world; see :func:`draw_world`.
 
     Raises:
         WorldError: an argument is out of its range, or the image would be too large.
@@ -88,8 +107,7 @@ def draw_world(seed: int, size_m: float = 400.0, gsd_m: float = 0.1) -> World:
     size_px = round(size_m / gsd_m)
     name = f'drawn-{seed}'
     check_size(size_px, size_px, f'world {name!r}')
-    image, labels = draw_town(seed, size_px, gsd_m)
-    return World(image, labels, gsd_m, name)
+    return name, size_px
 
 
 def load_world(

@@ -144,9 +144,10 @@ def _launch_arguments() -> set[str]:
 
 def _options_of(words: tuple[str, ...]) -> tuple[set[str], int]:
     """Return the options of a verb, and how many words its name has."""
-    if words[:1] == ('models',) and len(words) > 1:
-        assert words[1] in command_line.MODEL_VERBS, words
-        module, function, count = 'models', f'models_{words[1]}', 2
+    groups = {'models': command_line.MODEL_VERBS, 'world': command_line.WORLD_VERBS}
+    if words[0] in groups and len(words) > 1:
+        assert words[1] in groups[words[0]], words
+        module, function, count = words[0], f'{words[0]}_{words[1]}', 2
     else:
         assert words[0] in command_line.VERBS, words
         module, function, count = words[0], words[0], 1
@@ -160,7 +161,7 @@ def _options_of(words: tuple[str, ...]) -> tuple[set[str], int]:
 def _check_peace(words: tuple[str, ...]) -> None:
     if not words or words[0] in {'--help', '--version'} or not re.match(r'[a-z]', words[0]):
         return
-    if words == ('models',):
+    if words in {('models',), ('world',)}:
         return
     options, count = _options_of(words)
     for word in words[count:]:
@@ -174,8 +175,10 @@ def _check_peace(words: tuple[str, ...]) -> None:
 
 def _check_ros(words: tuple[str, ...]) -> None:
     if words[1:3] == ('run', 'peace_ros') and words[3] != 'peace':
-        assert words[3] in (*FLYING_NODES, *SIMULATOR_NODES)
-        known = named(NODE_PARAMETERS[words[3]])
+        executables = {name: (name,) for name in (*FLYING_NODES, *SIMULATOR_NODES)}
+        executables['perception'] = ('prompt_generator', 'segmentation')
+        assert words[3] in executables
+        known = {key for node in executables[words[3]] for key in named(NODE_PARAMETERS[node])}
         for option, value in pairwise(words):
             if option == '-p':
                 name = value.partition(':=')[0]

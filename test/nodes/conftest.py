@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -24,7 +24,7 @@ from peace_ros.core.vehicle import VehicleParameters, open_vehicle
 from peace_ros.nodes import qos
 from peace_ros.nodes.inputs import FRAME_INFO
 from peace_ros.nodes.messages import camera_info, heatmap_to_image, image_message
-from peace_ros.nodes.runtime import PeaceNode
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.simulation.demo.pilot import Pilot
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
@@ -92,17 +92,31 @@ class Bench:
         self.peer.create_subscription(kind, topic, keep, profile)
         return messages
 
+    def findings(self, task: str) -> list[DiagnosticStatus]:
+        """Return a list that gets what /diagnostics says of a task that had work."""
+        found: list[DiagnosticStatus] = []
+
+        def keep(message: DiagnosticArray) -> None:
+            found.extend(
+                each
+                for each in message.status
+                if each.name.endswith(f': {task}') and 'nothing to do' not in each.message
+            )
+
+        self.peer.create_subscription(DiagnosticArray, '/diagnostics', keep, qos.RESULT)
+        return found
+
     def offer(self, kind: Any, topic: str, profile: Any) -> Any:
         """Return a publisher once the node under test listens."""
         publisher = self.peer.create_publisher(kind, topic, profile)
         self.until(lambda: publisher.get_subscription_count() > 0)
         return publisher
 
-    def offer_heatmaps(self) -> Heatmaps:
+    def offer_heatmaps(self, namespace: str = '') -> Heatmaps:
         """Return a publisher of heatmaps once the landing node listens."""
         return Heatmaps(
-            self.offer(Image, 'heatmap', qos.IMAGE_OUT),
-            self.offer(CameraInfo, FRAME_INFO, qos.RESULT),
+            self.offer(Image, f'{namespace}/heatmap'.lstrip('/'), qos.IMAGE_OUT),
+            self.offer(CameraInfo, f'{namespace}/{FRAME_INFO}'.lstrip('/'), qos.RESULT),
         )
 
     def until(
@@ -156,8 +170,12 @@ def picture() -> Callable[[int], Any]:
 
 
 @pytest.fixture
-def values_of() -> Callable[[DiagnosticArray], dict[str, str]]:
-    return lambda message: {each.key: each.value for each in message.status[0].values}
+def values_of() -> Callable[[DiagnosticArray | DiagnosticStatus], dict[str, str]]:
+    def values(message: DiagnosticArray | DiagnosticStatus) -> dict[str, str]:
+        status = message.status[0] if isinstance(message, DiagnosticArray) else message
+        return {each.key: each.value for each in status.values}
+
+    return values
 
 
 @pytest.fixture

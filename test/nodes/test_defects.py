@@ -259,7 +259,8 @@ BROKEN_NODE = """
 import sys, time
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.node import PeaceNode
+from peace_ros.nodes.runtime import run
 
 class BrokenNode(PeaceNode):
     def __init__(self):
@@ -321,11 +322,11 @@ def test_a_defect_in_a_callback_ends_the_process_within_a_second(way):
 
 
 def test_a_landing_node_that_still_waits_for_its_vehicle_fails_as_well(bench, values_of):
-    statuses = bench.heard(DiagnosticArray, 'landing/status', qos.RESULT)
+    statuses = bench.heard(DiagnosticArray, 'broken/landing/status', qos.RESULT)
     node = subprocess.Popen(
         [
             *(sys.executable, '-m', 'peace_ros.lab.faults.landing', '--ros-args'),
-            *('-p', 'mavlink:=udpin:127.0.0.1:0'),
+            *('-p', 'mavlink:=udpin:127.0.0.1:0', '-r', '__ns:=/broken'),
         ],
         cwd=ROOT,
         stdout=subprocess.DEVNULL,
@@ -333,7 +334,7 @@ def test_a_landing_node_that_still_waits_for_its_vehicle_fails_as_well(bench, va
         text=True,
     )
     try:
-        defects = bench.offer(String, 'fault/defect', qos.RESULT)
+        defects = bench.offer(String, 'broken/fault/defect', qos.RESULT)
         bench.until(lambda: bool(statuses))
         defects.publish(String(data='connection'))
         _, log = node.communicate(timeout=20)

@@ -25,7 +25,7 @@ from peace_ros.lab.parameter_docs import (
     defaults_yaml,
     markdown,
 )
-from peace_ros.nodes.runtime import PeaceNode
+from peace_ros.nodes.node import PeaceNode
 
 ROOT = Path(__file__).resolve().parents[2]
 PRESETS = ROOT / 'config' / 'presets'
@@ -38,6 +38,17 @@ class Sample(ParameterSet):
     name: str = parameter('a', 'Which one', choices=('a', 'b'))
     active: bool = parameter(default=False, description='Whether')
     providers: tuple[str, ...] = parameter(('x', 'y'), 'In order')
+
+
+@dataclass(frozen=True)
+class Live(ParameterSet):
+    low: float = parameter(0.5, 'Lower end', low=0.0, high=5.0, live=True)
+    high: float = parameter(1.0, 'Upper end', low=0.0, high=5.0, live=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.low > self.high:
+            raise ConfigurationError(f'low {self.low} above high {self.high}')
 
 
 def node_with(**values: object) -> PeaceNode:
@@ -65,10 +76,40 @@ def test_a_given_value_arrives_and_a_whole_number_serves_as_a_float():
     node.destroy_node()
 
 
-def test_no_parameter_can_be_changed_in_flight():
+def test_a_parameter_that_is_not_live_is_read_only():
     node = node_with()
     (result,) = node.set_parameters([Parameter('speed', value=2.0)])
     assert not result.successful
+    assert 'read-only' in result.reason
+    node.destroy_node()
+
+
+def change(node: PeaceNode, **values: object):
+    given = [Parameter(name, value=value) for name, value in values.items()]
+    return node.set_parameters_atomically(given)
+
+
+def test_live_parameters_change_together_or_not_at_all():
+    node = PeaceNode('sample', ('', Live))
+    assert change(node, low=2.0, high=3.0).successful
+    assert node.filled(Live) == Live(low=2.0, high=3.0)
+    refused = change(node, low=4.0, high=3.5)
+    assert (refused.successful, refused.reason) == (False, 'low 4.0 above high 3.5')
+    assert not change(node, low=2.5, high=99.0).successful
+    assert node.filled(Live) == Live(low=2.0, high=3.0)
+    assert node.get_parameter('low').value == 2.0
+    node.destroy_node()
+
+
+def test_what_the_node_itself_refuses_does_not_change():
+    class Busy(PeaceNode):
+        def change(self, filled):
+            raise ConfigurationError('busy')
+
+    node = Busy('sample', ('', Live))
+    refused = change(node, low=0.7)
+    assert (refused.successful, refused.reason) == (False, 'busy')
+    assert node.filled(Live) == Live()
     node.destroy_node()
 
 
@@ -100,14 +141,54 @@ def test_a_bad_value_is_refused_in_one_sentence(values, words):
 def node_from(tmp_path, monkeypatch):
     """Start a node with a parameter file."""
 
-    def start(text: str) -> PeaceNode:
+    def start(text: str, *remaps: str) -> PeaceNode:
         path = tmp_path / 'given.yaml'
         path.write_text(text)
         arguments = ['--ros-args', '--params-file', str(path)]
+        arguments += [each for remap in remaps for each in ('-r', remap)]
         monkeypatch.setattr('sys.argv', ['sample', *arguments])
         return PeaceNode('sample', ('', Sample), cli_args=arguments)
 
     return start
+
+
+IN_DRONE, RENAMED = '__ns:=/drone', '__node:=other'
+
+
+@pytest.mark.parametrize(
+    ('section', 'remaps'),
+    [
+        ('sample', []),
+        ('/sample', []),
+        ('/**/sample', []),
+        ('/**/sample', [IN_DRONE]),
+        ('/*/sample', [IN_DRONE]),
+        ('/**/sample', ['__ns:=/fleet/drone']),
+        ('/drone/sample', [IN_DRONE]),
+        ('/**/other', [RENAMED]),
+        ('/**', [IN_DRONE, RENAMED]),
+    ],
+)
+def test_a_section_reaches_the_node_that_ros_says_it_is_for(node_from, section, remaps):
+    node = node_from(f'{section}:\n  ros__parameters: {{count: 7}}\n', *remaps)
+    assert node.filled(Sample).count == 7
+    node.destroy_node()
+
+
+@pytest.mark.parametrize(
+    ('section', 'remaps', 'remedy'),
+    [
+        ('sample', [IN_DRONE], '/**/sample'),
+        ('/sample', [IN_DRONE], '/**/sample'),
+        ('/*/sample', [], '/**/sample'),
+        ('/swarm/sample', [IN_DRONE], '/**/sample'),
+        ('/**/sample', [RENAMED], '/**/other'),
+    ],
+)
+def test_a_file_that_ros_would_ignore_is_refused(node_from, section, remaps, remedy):
+    with pytest.raises(ConfigurationError, match='would be ignored') as caught:
+        node_from(f'{section}:\n  ros__parameters: {{count: 7}}\n', *remaps)
+    assert str(caught.value).endswith(f'name the section {remedy}')
 
 
 WILDCARD = '/**:\n  ros__parameters:\n    count: 7\n'
@@ -157,7 +238,7 @@ def test_code_yaml_and_documentation_agree(node):
         name: list(value) if isinstance(value, tuple) else value for name, value in defaults.items()
     }
     shipped = yaml.safe_load((ROOT / 'config' / 'defaults.yaml').read_text())
-    written = flat(shipped[node]['ros__parameters'])
+    written = flat(shipped[f'/**/{node}']['ros__parameters'])
     assert written == plain
     assert {name: type(value) for name, value in written.items()} == {
         name: type(value) for name, value in plain.items()
@@ -194,13 +275,14 @@ def test_presets_are_the_six_of_the_paper_and_their_values_exist():
         f'{prompt}_{model}' for prompt in ('dd', 'd', 'peace') for model in ('cs', 'fs')
     }
     for path in PRESETS.glob('*.yaml'):
-        for node, section in yaml.safe_load(path.read_text()).items():
+        for wildcard, section in yaml.safe_load(path.read_text()).items():
+            node = wildcard.removeprefix('/**/')
             known = named(NODE_PARAMETERS[node])
             for name, value in section['ros__parameters'].items():
                 assert type(value) is type(known[name].default), f'{path.name}: {node}.{name}'
             prompt, model = path.stem.split('_')
             assert section['ros__parameters']['template'] == prompt.upper()
-        family = yaml.safe_load(path.read_text())['segmentation']['ros__parameters']['family']
+        family = yaml.safe_load(path.read_text())['/**/segmentation']['ros__parameters']['family']
         assert family == {'cs': 'clipseg', 'fs': 'fastsam'}[model]
 
 

@@ -32,7 +32,8 @@ def start(node: str, *arguments: str) -> subprocess.Popen[str]:
 SLOW_NODE = """
 import sys, time
 from std_msgs.msg import String
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.node import PeaceNode
+from peace_ros.nodes.runtime import run
 
 class SlowNode(PeaceNode):
     def __init__(self):
@@ -72,7 +73,8 @@ def test_nothing_is_destroyed_under_a_callback():
 BUSY_NODE = """
 import gc, sys
 from rclpy.task import Future
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.node import PeaceNode
+from peace_ros.nodes.runtime import run
 
 class BusyNode(PeaceNode):
     turns = 0

@@ -100,4 +100,4 @@ def test_the_environment_has_what_the_unit_uses() -> None:
 
 def test_the_parameters_of_a_vehicle_are_accepted() -> None:
     preset = load_preset(SYSTEMD / 'vehicle.yaml')
-    assert set(preset.sections) == set(FLYING_NODES)
+    assert set(preset.sections) == {f'/**/{node}' for node in FLYING_NODES}

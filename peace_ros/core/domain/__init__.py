@@ -12,6 +12,7 @@ from peace_ros.core.domain.errors import (
     VehicleError,
     WorldError,
 )
+from peace_ros.core.domain.health import Health, Level
 from peace_ros.core.domain.labels import SAFE_LABELS, Label, is_safe
 from peace_ros.core.domain.motion import HeightReport, Pose, Setpoint, Site, Telemetry
 from peace_ros.core.domain.perception import DepthImage, Frame, Heatmap, Prompt, RankedWord
@@ -25,10 +26,12 @@ __all__ = [
     'DepthImage',
     'Distortion',
     'Frame',
+    'Health',
     'Heatmap',
     'HeightReport',
     'ImageError',
     'Label',
+    'Level',
     'Mount',
     'PeaceError',
     'Pose',

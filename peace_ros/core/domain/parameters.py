@@ -32,6 +32,8 @@ class ParameterInfo:
     choices: tuple[str, ...]
     """Allowed strings; empty when any is."""
     description: str
+    live: bool = False
+    """It may change while the node runs."""
 
 
 def parameter(
@@ -42,12 +44,14 @@ def parameter(
     low: float | None = None,
     high: float | None = None,
     choices: tuple[str, ...] = (),
+    live: bool = False,
 ) -> Any:
     """Declare a field of a parameter dataclass; lists are given as tuples.
 
-    A unit that the name ends with (``_m_s``, ``_m``, ``_s``, ``_deg``) need not be given.
+    A unit that the name ends with (``_m_s``, ``_m``, ``_s``, ``_deg``) need not be given. With
+    ``live`` it may change while the node runs.
     """
-    info = ParameterInfo('', default, unit, low, high, choices, description)
+    info = ParameterInfo('', default, unit, low, high, choices, description, live)
     return field(default=default, metadata={_METADATA_KEY: info})
 
 

@@ -4,11 +4,12 @@
 
 from peace_ros.core.landing.core import LandingCore
 from peace_ros.core.landing.decision import Decision, Focus, Verdict, VerdictKind
-from peace_ros.core.landing.engagement import engagement_problem
+from peace_ros.core.landing.engagement import engagement_problem, readiness
 from peace_ros.core.landing.parameters import SAFETY_THRESHOLD_FLOOR, LandingParameters
-from peace_ros.core.landing.states import SILENT_STATES, State
+from peace_ros.core.landing.states import CONCERNING_STATES, SILENT_STATES, State
 
 __all__ = [
+    'CONCERNING_STATES',
     'SAFETY_THRESHOLD_FLOOR',
     'SILENT_STATES',
     'Decision',
@@ -19,4 +20,5 @@ __all__ = [
     'Verdict',
     'VerdictKind',
     'engagement_problem',
+    'readiness',
 ]

@@ -8,6 +8,7 @@ Each step handles data, site, state, guidance and guard, in this order.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 
 from peace_ros.core.domain import (
     NADIR,
@@ -18,6 +19,7 @@ from peace_ros.core.domain import (
     HeightReport,
     Mount,
     Pose,
+    Site,
     Telemetry,
 )
 from peace_ros.core.landing.decision import Decision
@@ -26,15 +28,17 @@ from peace_ros.core.landing.heights import HeightWatch
 from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.intake import HeatmapIntake
 from peace_ros.core.landing.lookout import Lookout
+from peace_ros.core.landing.memory import FailedPlace
 from peace_ros.core.landing.parameters import LandingParameters
 from peace_ros.core.landing.situation import Sighting
 from peace_ros.core.landing.states import State
 from peace_ros.core.landing.watch import valid_pose
 from peace_ros.core.mapping import MapParameters, SafetyMap
 
-_PICTURE_LIMIT_NS = 2_000_000_000
+_NANOSECONDS = 1_000_000_000
+_PICTURE_LIMIT_NS = 2 * _NANOSECONDS
 """Age at which a picture says nothing of the height."""
-_JUMP_NS = 1_000_000_000
+_JUMP_NS = _NANOSECONDS
 """A clock that goes back by more than this was restarted."""
 
 
@@ -72,6 +76,21 @@ class LandingCore:
     def state(self) -> State:
         """The state that the last step ended in."""
         return self._helm.state
+
+    def map_age_s(self, now_ns: int) -> float:
+        """Return the age of the newest heatmap in the map, infinite without one."""
+        stamp_ns = self.safety_map.stamp_ns
+        return inf if stamp_ns is None else (now_ns - stamp_ns) / _NANOSECONDS
+
+    @property
+    def failed_places(self) -> tuple[FailedPlace, ...]:
+        """Circles in which no site is chosen now."""
+        return self._lookout.memory.failed
+
+    @property
+    def seen_sites(self) -> tuple[Site, ...]:
+        """Every other site that was seen, as it was seen last."""
+        return self._lookout.memory.seen
 
     @property
     def last_rejection(self) -> str:

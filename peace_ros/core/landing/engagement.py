@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from peace_ros.core.domain import Telemetry
+from peace_ros.core.domain import Health, Level, Telemetry
 from peace_ros.core.landing.parameters import LandingParameters
-from peace_ros.core.landing.states import State
+from peace_ros.core.landing.states import CONCERNING_STATES, SILENT_STATES, State
 from peace_ros.core.landing.watch import bad_map, bad_vehicle
 
 _MAY_BEGIN = frozenset({State.IDLE, State.HOLD, State.HANDOVER, State.ABORTED})
@@ -37,3 +37,19 @@ def engagement_problem(
     return bad_vehicle(telemetry, telemetry_age_s, parameters) or bad_map(
         map_age_s, last_rejection, parameters
     )
+
+
+def readiness(state: State, several: str, problem: str) -> Health:
+    """Return whether a landing goes well, or could begin now.
+
+    Args:
+        state: Of the landing so far.
+        several: Which topic has several publishers, empty when none has.
+        problem: Why a landing cannot begin now, empty when it can.
+    """
+    if several:
+        return Health(Level.ERROR, f'{state.value}, nothing is engaged: {several}')
+    if state not in SILENT_STATES:
+        return Health(Level.WARN if state in CONCERNING_STATES else Level.OK, state.value)
+    level = Level.ERROR if state is State.ABORTED else Level.WARN if problem else Level.OK
+    return Health(level, f'{state.value}, {f"not ready: {problem}" if problem else "ready"}')

@@ -32,11 +32,12 @@ class Lookout:
     @property
     def failed_sites(self) -> int:
         """Number of places that are excluded because they failed."""
-        return len(self._memory.failed)
+        return len(self.memory.failed)
 
     def begin(self) -> None:
         """Forget everything that belongs to an engagement."""
-        self._memory = SiteMemory(self._p)
+        self.memory = SiteMemory(self._p)
+        """Places of this engagement."""
         self._anchor: Site | None = None
         self._aimed_at: Site | None = None
         self._threshold = self._p.safety_threshold
@@ -58,7 +59,7 @@ class Lookout:
             state: Of the landing; it decides where to look, and how strictly.
             without_site_s: How long a site has been searched without success.
         """
-        self._memory.forgive(now_ns)
+        self.memory.forgive(now_ns)
         score, age_s = 0.0, inf
         if pose is not None:
             self._judge(now_ns, pose, state, without_site_s)
@@ -77,7 +78,7 @@ class Lookout:
             revision=self._map.revision,
             threshold=self._threshold,
             focus=self._focus,
-            best=self._memory.best(),
+            best=self.memory.best(),
         )
 
     def follow(self, before: State, state: State, now_ns: int) -> bool:
@@ -97,7 +98,7 @@ class Lookout:
     def _remember_failure(self, now_ns: int) -> bool:
         site, descended = self._anchor or self._aimed_at, self._anchor is not None
         if site is not None:
-            self._memory.fail(site, now_ns)
+            self.memory.fail(site, now_ns)
         self._verdict = Verdict.no_zone('the site failed')
         self._anchor = self._aimed_at = None
         return descended
@@ -126,7 +127,7 @@ class Lookout:
             self._choose_threshold(layers, age_limit_s, without_site_s)
         self._verdict = self.anchored(self._find(layers, focus, pose, age_limit_s))
         if self._verdict.site is not None:
-            self._memory.see(self._verdict.site)
+            self.memory.see(self._verdict.site)
         self._ground_is_fresh = self._fresh_below(now_ns, pose)
 
     def _find(self, layers: MapLayers, focus: Focus, pose: Pose, age_limit_s: float) -> Verdict:
@@ -136,7 +137,7 @@ class Lookout:
             threshold=self._threshold,
             required_clearance_m=self._p.required_clearance_m(pose.altitude_agl_m),
             age_limit_s=age_limit_s,
-            failed=self._memory.failed,
+            failed=self.memory.failed,
             incumbent=self._verdict.site or self._anchor,
         )
         return find_site(layers, search, self._p)

@@ -43,6 +43,11 @@ class SiteMemory:
         """Places that are excluded now."""
         return tuple(self._failed)
 
+    @property
+    def seen(self) -> tuple[Site, ...]:
+        """Sites as they were seen last, failed ones too."""
+        return tuple(self._seen)
+
     def forgive(self, now_ns: int) -> None:
         """Allow the places again whose time is over."""
         self._failed = [each for each in self._failed if each.until_ns > now_ns]

@@ -72,6 +72,7 @@ class LandingParameters(ParameterSet):
         'Ground counts as safe from this score of the map, not the heatmap.',
         low=SAFETY_THRESHOLD_FLOOR,
         high=0.98,
+        live=True,
     )
     relaxation: bool = parameter(
         False,

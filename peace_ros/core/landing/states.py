@@ -42,6 +42,10 @@ class State(str, Enum):
 STILL_STATES = frozenset({State.IDLE, State.WAITING, State.HANDOVER, State.HOLD, State.ABORTED})
 """States in which the set-point is zero."""
 SILENT_STATES = frozenset({State.IDLE, State.ABORTED})
+CONCERNING_STATES = frozenset(
+    {State.WAITING, State.CLIMBING, State.RESTARTING, State.RETURNING, State.HOLD}
+)
+"""The landing goes on, but not as hoped."""
 """States in which nothing is sent to the vehicle."""
 LOOKING = frozenset({State.SEARCHING, State.RESTARTING})
 """States that look for a site."""

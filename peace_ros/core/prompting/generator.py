@@ -34,15 +34,18 @@ class PromptingParameters(ParameterSet):
     template: str = parameter(
         'PEACE',
         'DD, D or PEACE, or a sentence with {term} and any of {resolution}, {frame}, {environment}',
+        live=True,
     )
     vocabularies: str = parameter(
-        'vocabularies.yaml', 'YAML file of the vocabularies: a path or the name of a shipped one'
+        'vocabularies.yaml',
+        'YAML file of the vocabularies: a path or the name of a shipped one',
+        live=True,
     )
     bundle: str = parameter(
         'clip-small', 'Model bundle of the family clip: a folder or the name of a shipped one'
     )
     environment_words: int = parameter(
-        1, 'Best environment words that a prompt names, joined by commas', low=1, high=10
+        1, 'Best environment words that a prompt names, joined by commas', low=1, high=10, live=True
     )
     margin: float = parameter(
         0.01,
@@ -50,12 +53,14 @@ class PromptingParameters(ParameterSet):
         'every frame',
         low=0.0,
         high=2.0,
+        live=True,
     )
     smoothing: float = parameter(
         0.0,
         'Weight of the frames before in the similarities, per frame; 0 looks at the newest alone',
         low=0.0,
         high=0.99,
+        live=True,
     )
     interval_s: float = parameter(
         0.0,
@@ -64,6 +69,7 @@ class PromptingParameters(ParameterSet):
         unit='s',
         low=0.0,
         high=60.0,
+        live=True,
     )
     threads: int = parameter(2, 'CPU threads of the networks', low=1, high=64)
     providers: tuple[str, ...] = parameter(
@@ -143,7 +149,8 @@ class PromptGenerator:
         """
         self._parameters = parameters
         self._sentence = resolve_template(parameters.template)
-        self._encoder = encoder
+        self.encoder = encoder
+        """Puts frames and words into one space; None with a static template."""
         self._categories: dict[str, _Category] = {}
         self._newest_stamp_ns: int | None = None
         self._ranked: Prompt | None = None
@@ -177,7 +184,7 @@ class PromptGenerator:
         alike. A stamp before that of the last frame begins a new sequence. Raises ImageError when
         the encoder cannot take the image, BundleError when its answer cannot be used.
         """
-        if self._encoder is None or not self._categories:
+        if self.encoder is None or not self._categories:
             return Prompt(self._sentence, frame.stamp_ns)
         if self._newest_stamp_ns is not None and frame.stamp_ns < self._newest_stamp_ns:
             self.reset()
@@ -185,7 +192,7 @@ class PromptGenerator:
         interval_ns = self._parameters.interval_s * 1e9
         if self._ranked is not None and frame.stamp_ns < self._ranked.stamp_ns + interval_ns:
             return Prompt(self._ranked.template, frame.stamp_ns, self._ranked.ranking)
-        self._ranked = self._rank(self._encoder, frame)
+        self._ranked = self._rank(self.encoder, frame)
         return self._ranked
 
     def _rank(self, encoder: Encoder, frame: Frame) -> Prompt:

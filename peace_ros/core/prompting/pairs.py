@@ -11,6 +11,8 @@ from peace_ros.core.domain import ConfigurationError, Prompt, RankedWord
 _TEMPLATE = 'template'
 _BEST = 'best'
 _SCORE = 'score'
+_MOST_TEMPLATE, _MOST = 1_000, 65_536
+"""Characters of a sentence, and of a whole prompt; more would cost time and memory in flight."""
 
 
 def prompt_pairs(prompt: Prompt) -> dict[str, str]:
@@ -30,12 +32,18 @@ def prompt_from_pairs(pairs: Mapping[str, str], stamp_ns: int) -> Prompt:
     """Return the prompt of its pairs, made from the frame with that stamp.
 
     Raises:
-        ConfigurationError: there is no template, or a score is not a number.
+        ConfigurationError: there is no template, a score is not a number, or it is too long.
 
     """
     if not pairs.get(_TEMPLATE):
         raise ConfigurationError(
             'prompt message without the key "template": connect the topic of a prompt_generator'
+        )
+    length = sum(len(key) + len(value) for key, value in pairs.items())
+    if len(pairs[_TEMPLATE]) > _MOST_TEMPLATE or length > _MOST:
+        raise ConfigurationError(
+            f'prompt message of {length} characters, {len(pairs[_TEMPLATE])} of them in its '
+            f'template: at most {_MOST} and {_MOST_TEMPLATE} are accepted'
         )
     ranking: dict[str, list[RankedWord]] = {}
     for key, value in pairs.items():

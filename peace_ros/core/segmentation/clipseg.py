@@ -57,8 +57,6 @@ class ClipSegSegmenter(BundleSegmenter):
         self._max_looks = (own or ClipSegParameters()).clipseg_max_looks
         self._preprocess = Preprocessor(self._manifest.input)
         self._features = [each.name for each in self._sessions['image_encoder'].graph.outputs]
-        positive, negative = len(self.terms.positive), len(self.terms.negative)
-        self._is_positive = np.array([1.0] * positive + [0.0] * negative, np.float32)
         size = self._manifest.input
         blank = np.zeros((size.height, size.width, 3), np.uint8)
         encoder = self._sessions['image_encoder']
@@ -120,7 +118,8 @@ class ClipSegSegmenter(BundleSegmenter):
     def _feeds(self, features: Sequence[Scores], texts: Scores) -> dict[str, Scores]:
         feeds = dict(zip(self._features, features, strict=True))
         feeds[TEXT_EMBEDDING] = texts
-        feeds[IS_POSITIVE] = self._is_positive
+        positive, negative = len(self.terms.positive), len(self.terms.negative)
+        feeds[IS_POSITIVE] = np.array([1.0] * positive + [0.0] * negative, np.float32)
         return feeds
 
     def _checked(self, scores: Scores) -> Scores:

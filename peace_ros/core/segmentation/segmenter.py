@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
@@ -34,7 +35,7 @@ class SegmentationParameters(ParameterSet):
         'clipseg-small', 'Model bundle of that family: a folder or the name of a shipped one'
     )
     terms: str = parameter(
-        'terms.yaml', 'YAML file of the terms: a path or the name of a shipped one'
+        'terms.yaml', 'YAML file of the terms: a path or the name of a shipped one', live=True
     )
     fusion: str = parameter(
         'set_difference',
@@ -77,6 +78,12 @@ class Segmenter(Protocol):
 
     def prepare(self, prompt: Prompt) -> None:
         """Embed the prompt's texts ahead of the frame; may be called from another thread."""
+
+    def with_terms(self, terms: Terms) -> Segmenter:  # noqa: ARG002
+        """Return a segmenter over the same networks that looks for other terms."""
+        raise ConfigurationError(
+            f'{type(self).__name__} cannot change its terms: start the node again with them'
+        )
 
     def segment(self, frame: Frame, prompt: Prompt) -> Heatmap:
         """Return the safety of each pixel, with the frame's stamp.
@@ -122,6 +129,7 @@ class BundleSegmenter(Segmenter):
                 the family or the fusion.
         """
         self._check_terms(terms, parameters)
+        self._parameters = parameters
         loaded = bundle if isinstance(bundle, Bundle) else Bundle.load(bundle)
         loaded.require_family(self.FAMILY)
         meter = LoadMeter()
@@ -161,6 +169,17 @@ class BundleSegmenter(Segmenter):
     def calls(self) -> Mapping[str, int]:
         """Role of a network -> how often it ran, without warm-ups."""
         return {role: session.calls for role, session in self._sessions.items()}
+
+    def with_terms(self, terms: Terms) -> BundleSegmenter:
+        """Return a segmenter over the same networks that looks for other terms.
+
+        Raises:
+            ConfigurationError: they do not fit the family or the fusion.
+        """
+        self._check_terms(terms, self._parameters)
+        other = copy(self)
+        other.terms = terms
+        return other
 
     def prepare(self, prompt: Prompt) -> None:
         """Embed the prompt's texts ahead of the frame; may be called from another thread."""

@@ -25,16 +25,17 @@ from peace_ros.core.domain import Pose, Setpoint
 from peace_ros.core.domain.geometry import lean_acceleration
 from peace_ros.core.landing.drift import Drift
 from peace_ros.core.vehicle.obedience import ObedienceWatch, ReportedMotion
-from peace_ros.lab.evaluation.wind import flying
 from peace_ros.simulation.autopilot.estimate_errors import PX4_ERRORS, ErrorSizes, EstimateErrors
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.guided import PositionTarget
+from peace_ros.simulation.autopilot.hovering import hovering
 from peace_ros.simulation.autopilot.personality import Kind, Personality
 from peace_ros.simulation.autopilot.physics import Physics
 
 TIME_LIMIT_S, WAY_LIMIT_M = 3.0, 4.0
 """A fault has to be found within both."""
 LEG_SPEEDS_M_S = (1.0, 1.5, 2.0, 3.0)
+_START_M = 60.0
 _TICK_S = 0.02
 _REPORT_S = 0.04
 _DELAY_S = 0.06
@@ -143,7 +144,7 @@ class WatchedFlight:
         turn = self.random.uniform(0.0, 2.0 * pi)
         wind = (wind_m_s * cos(turn), wind_m_s * sin(turn))
         physics = Physics(wind_to_m_s=wind, gust_m_s=_GUST_SHARE * wind_m_s, seed=seed)
-        self.flight = flying(physics, Personality(kind), EstimateErrors(sizes, seed))
+        self.flight = hovering(physics, _START_M, Personality(kind), EstimateErrors(sizes, seed))
         self.observers = [Observer(ObedienceWatch())]
         """The first hears true reports."""
         self._line = Random(seed)

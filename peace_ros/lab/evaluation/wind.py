@@ -32,10 +32,8 @@ from peace_ros.core.domain import (
     Label,
     Mount,
     Pose,
-    Setpoint,
     Site,
     Telemetry,
-    VehicleError,
 )
 from peace_ros.core.landing import Decision, LandingCore, LandingParameters, State
 from peace_ros.core.mapping import MapParameters
@@ -44,9 +42,7 @@ from peace_ros.simulation.autopilot.estimate_errors import (
     EstimateErrors,
     GnssAltitudeError,
 )
-from peace_ros.simulation.autopilot.flight import Flight
-from peace_ros.simulation.autopilot.guided import PositionTarget
-from peace_ros.simulation.autopilot.modes import Mode
+from peace_ros.simulation.autopilot.hovering import hovering, velocity_target
 from peace_ros.simulation.autopilot.personality import Kind, Personality
 from peace_ros.simulation.autopilot.physics import Physics
 from peace_ros.simulation.camera import NadirCamera
@@ -69,9 +65,6 @@ _AFTER_S = 10.0
 """Time observed after the hand-over, in which gusts go on."""
 _LAST_S = 10.0
 """End of the descent, in which the vehicle must hover over the site."""
-_BOOT_S = 60.0
-_VELOCITY_AND_RATE = 0x5C7
-_LOCAL_NED = 1
 _PIXELS = 96
 _DRAWN_PX = 320
 """Longer edge of the pictures from which heatmaps are made."""
@@ -148,7 +141,7 @@ class WindFlight:
         kind = Kind.PX4 if px4_errors > 0.0 else Kind.ARDUPILOT
         errors = EstimateErrors(PX4_ERRORS.times(px4_errors), seed)
         gnss = GnssAltitudeError(gnss_noise_m, seed)
-        self._flight = flying(physics, Personality(kind), errors, gnss, start_m)
+        self._flight = hovering(physics, start_m, Personality(kind), errors, gnss)
         square = Camera.from_degrees(_PIXELS, _PIXELS, 73)
         self._camera = camera
         self._over_ground = self._seeing(square if camera is None else camera, mount)
@@ -280,7 +273,7 @@ class WindFlight:
         decision = self._core.step(round(self._now_s * 1e9), self._telemetry, age_s)
         physics = self._flight.physics
         self.track.append((self._now_s, physics.north_m, physics.east_m, decision))
-        self._flight.take_velocity(_target(decision.setpoint))
+        self._flight.take_velocity(velocity_target(decision.setpoint))
 
     def _error_m(self, index: int, site: Site | None) -> float:
         _, north, east, _ = self.track[index]
@@ -319,52 +312,6 @@ def to_and_fro_m(places_m: NDArray[np.float64]) -> float:
     rise = (places_m - np.minimum.accumulate(places_m)).max(axis=0)
     fall = (np.maximum.accumulate(places_m) - places_m).max(axis=0)
     return float(np.minimum(rise, fall).max())
-
-
-def flying(
-    physics: Physics,
-    personality: Personality | None = None,
-    errors: EstimateErrors | None = None,
-    gnss: GnssAltitudeError | None = None,
-    start_m: float = START_M,
-) -> Flight:
-    """Return an autopilot that has hovered in this wind for a while, in GUIDED or OFFBOARD.
-
-    Args:
-        physics: Of the vehicle, at rest on the ground.
-        personality: Which autopilot; None: ArduPilot.
-        errors: Of its estimates; None: none.
-        gnss: Error of the GNSS altitude; None: none.
-        start_m: Height at which it hovers.
-
-    Raises:
-        VehicleError: it does not come into the air.
-    """
-    flight = Flight(physics, personality, errors=errors, gnss=gnss)
-    while not flight.has_position:
-        flight.step(_TICK_S)
-    flight.set_mode(Mode.STABILIZE if flight.personality.is_px4 else Mode.GUIDED)
-    flight.arm(force=True)
-    flight.take_off(5.0)
-    until_s = flight.time_s + _BOOT_S
-    while flight.landed_state.name != 'IN_AIR':
-        if flight.time_s > until_s:
-            raise VehicleError(f'the simulated vehicle did not take off within {_BOOT_S:g} s')
-        flight.step(_TICK_S)
-    physics.north_m = physics.east_m = 0.0
-    physics.down_m = -start_m
-    for mode in (Mode.BRAKE, Mode.GUIDED):
-        flight.take_velocity(_target(Setpoint(0)))
-        flight.set_mode(mode)
-        for _ in range(round(3.0 / _TICK_S)):
-            flight.take_velocity(_target(Setpoint(0)))
-            flight.step(_TICK_S)
-    return flight
-
-
-def _target(setpoint: Setpoint) -> PositionTarget:
-    velocity = (setpoint.v_north_m_s, setpoint.v_east_m_s, setpoint.v_down_m_s)
-    return PositionTarget(_LOCAL_NED, _VELOCITY_AND_RATE, velocity)
 
 
 def fly(

@@ -266,7 +266,7 @@ class FlightBench:
         parameters: dict[str, object] = {}
         if name == 'autopilot_sim':
             parameters = {'port': self.autopilot_port, 'fault_port': self._fault_port}
-            parameters['publish_clock'] = self.setting.sim_time
+            parameters.update(publish_clock=self.setting.sim_time, ground_station='')
             parameters['autopilot'] = self.setting.autopilot
             parameters.update(self._key(''))
             clock, remaps = {}, {'/clock': '/' + RAW + 'clock'}

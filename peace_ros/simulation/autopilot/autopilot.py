@@ -85,6 +85,11 @@ class AutopilotSim:
         """Where a companion connects to."""
         return f'udpout:{self.parameters.host}:{self._server.port}'
 
+    def call(self, host: str, port: int) -> None:
+        """Send to a ground station that listens on UDP and has not spoken yet."""
+        with self.lock:
+            self._server.call((host, port))
+
     @property
     def time_ns(self) -> int:
         """Simulated clock; a reboot of the autopilot does not reset it."""

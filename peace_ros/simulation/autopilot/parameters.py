@@ -18,7 +18,7 @@ class AutopilotParameters(ParameterSet):
     )
     host: str = parameter('127.0.0.1', 'Address on which the MAVLink server listens.')
     port: int = parameter(
-        14550, 'UDP port of the MAVLink server; 0 lets the system choose.', low=0, high=65535
+        18570, 'UDP port of the MAVLink server; 0 lets the system choose.', low=0, high=65535
     )
     tcp_port: int = parameter(
         0, 'TCP port of the MAVLink server besides; 0 opens none.', low=0, high=65535

@@ -91,6 +91,10 @@ class MavlinkServer:
         """Messages that were not signed with the key, when there is one."""
         return self._signing.refused
 
+    def call(self, address: Address) -> None:
+        """Send to a UDP address from now on, before anybody there has spoken."""
+        self._peer(address)
+
     def close(self) -> None:
         """Release the ports."""
         self._lines.close()

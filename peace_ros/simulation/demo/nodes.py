@@ -60,6 +60,7 @@ def node_arguments(wiring: Wiring) -> Arguments:
         autopilot = {
             'autopilot': wiring.autopilot,
             'port': wiring.autopilot_port,
+            'ground_station': '',
             'speed': float(wiring.speed),
             'publish_clock': wiring.use_sim_time,
         }

@@ -46,7 +46,7 @@ class DemoOptions:
         ),
     ] = None
     config: Annotated[
-        str, Option(metavar='PRESET', help='Preset: dd_cs, d_cs, peace_cs, or a file.')
+        str, Option(metavar='PRESET', help='Preset: dd, d or peace, with _cs or _fs; or a file.')
     ] = 'peace_cs'
     speed: Annotated[
         float | None,

@@ -77,11 +77,16 @@ _LAYOUTS: dict[str, _Layout] = {
          'wood': 0.4, 'square': 0.4, 'sports': 0.3},
         (50, 100), (4.0, 6.0), ('asphalt', 'old_asphalt', 'gravel'), 0.8, 1.4, 2.2,
     ),
+    'forest': _Layout(
+        {'wood': 7, 'meadow': 1.6, 'field': 0.8, 'farmyard': 0.3, 'lake': 0.4},
+        (60, 130), (2.6, 5.0), ('track', 'gravel'), 0.0, 0.5, 1.0,
+    ),
 }  # fmt: skip
 
 _Along = Callable[[float, float], tuple[float, float]]
 
-LAYOUTS = tuple(_LAYOUTS)
+LAYOUTS = tuple(name for name in _LAYOUTS if name != 'forest')
+"""Of scenes; forest is for towns only, so that the scenes of a seed stay as they are."""
 
 
 def plan_layout(rng: np.random.Generator, layout: str, season: str, extent_m: float) -> Plan:

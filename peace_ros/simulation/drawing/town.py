@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import product
 from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
+from peace_ros.core.domain import WorldError
 from peace_ros.simulation.drawing.furnish import Block, Furnisher
 from peace_ros.simulation.drawing.layouts import fill_district, run_avenue
 from peace_ros.simulation.drawing.light import Sun
@@ -21,39 +24,112 @@ from peace_ros.simulation.drawing.window import DrawnWindow
 _TILE_PX = 1000
 _MARGIN_M = 24.0
 """Longest shadow that reaches into a tile from outside."""
-_OPEN = ('park', 'farmland', 'village', 'desert')
-_BUILT = ('suburb', 'city', 'industrial', 'suburb', 'village')
 
 
-def draw_town(seed: int, size_px: int, gsd_m: float) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return image (size x size x 3, RGB) and labels (size x size) of a mixed place."""
-    rng = np.random.Generator(np.random.PCG64([seed, 2]))
-    season = SEASONS[int(rng.choice(4, p=(0.3, 0.4, 0.2, 0.1)))]
-    sun = Sun(float(rng.uniform(0.0, 2.0 * pi)), float(rng.uniform(0.75, 1.0)), 0.9)
-    look = Look.draw(rng)
-    extent = size_px * gsd_m
-    plan = plan_town(rng, season, extent)
+@dataclass(frozen=True)
+class District:
+    """What a town is made of: two kinds of parts, side by side like the fields of a chessboard."""
+
+    open_layouts: tuple[str, ...]
+    built_layouts: tuple[str, ...]
+    river: float = 0.7
+    """How often there is a water."""
+    river_width: tuple[float, float] = (0.06, 0.10)
+    """Of it, as a part of the extent."""
+
+
+DISTRICTS: dict[str, District] = {
+    'mixed': District(
+        ('park', 'farmland', 'village', 'desert'),
+        ('suburb', 'city', 'industrial', 'suburb', 'village'),
+    ),
+    'suburb': District(('park', 'village'), ('suburb',), river=0.3),
+    'city_centre': District(('park', 'city'), ('city',)),
+    'campus': District(('park',), ('city', 'park', 'suburb'), river=0.3),
+    'farmland': District(('farmland',), ('farmland', 'village'), river=0.4),
+    'industrial': District(('industrial',), ('industrial', 'suburb'), river=0.5),
+    'coast': District(
+        ('park', 'desert'), ('suburb', 'city', 'village'), river=1.0, river_width=(0.3, 0.4)
+    ),
+    'forest_edge': District(('forest',), ('forest', 'forest', 'farmland'), river=0.4),
+}
+"""Name -> its parts."""
+MIXED = 'mixed'
+
+
+class Town:
+    """The plan of a mixed place, and its drawing in parts.
+
+    Args:
+        seed: 0 or more; the same seed and extent give the same place at any resolution.
+        extent_m: width and height in metres.
+        district: one of DISTRICTS.
+        season: one of SEASONS; empty lets the seed choose.
+
+    Raises:
+        WorldError: district or season is unknown.
+    """
+
+    def __init__(self, seed: int, extent_m: float, district: str = MIXED, season: str = '') -> None:
+        check_town(district, season)
+        rng = np.random.Generator(np.random.PCG64([seed, 2]))
+        drawn_season = SEASONS[int(rng.choice(4, p=(0.3, 0.4, 0.2, 0.1)))]
+        self._seed, self._half_m = seed, 0.5 * extent_m
+        self._sun = Sun(float(rng.uniform(0.0, 2.0 * pi)), float(rng.uniform(0.75, 1.0)), 0.9)
+        self._look = Look.draw(rng)
+        self._plan = plan_town(rng, season or drawn_season, extent_m, DISTRICTS[district])
+
+    def draw(
+        self, rows: slice, columns: slice, gsd_m: float
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Return the image (height x width x 3, RGB) and the labels of a part.
+
+        Args:
+            rows: pixels, counted from the north edge.
+            columns: pixels, counted from the west edge.
+            gsd_m: metres per pixel.
+        """
+        margin = round(_MARGIN_M / gsd_m)
+        window = DrawnWindow(
+            (columns.start - margin) * gsd_m - self._half_m,
+            (rows.start - margin) * gsd_m - self._half_m,
+            columns.stop - columns.start + 2 * margin,
+            rows.stop - rows.start + 2 * margin,
+            gsd_m,
+        )
+        canvas = render(self._plan, window, self._seed, self._sun, self._look)
+        inner = (slice(margin, window.height_px - margin), slice(margin, window.width_px - margin))
+        return develop(canvas, self._look, self._seed)[inner], canvas.labels[inner]
+
+
+def check_town(district: str, season: str) -> None:
+    """Refuse what no town can be; see :class:`Town`."""
+    if district not in DISTRICTS:
+        raise WorldError(f'district {district!r}: choose one of {", ".join(DISTRICTS)}')
+    if season and season not in SEASONS:
+        raise WorldError(f'season {season!r}: choose one of {", ".join(SEASONS)}')
+
+
+def tiles_of(size_px: int, tile_px: int) -> list[slice]:
+    """Return the pixels of each tile along one side."""
+    return [slice(at, min(at + tile_px, size_px)) for at in range(0, size_px, tile_px)]
+
+
+def draw_town(
+    seed: int, size_px: int, gsd_m: float, district: str = MIXED, season: str = ''
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return image (size x size x 3, RGB) and labels (size x size) of a place; see Town."""
+    town = Town(seed, size_px * gsd_m, district, season)
     image = np.empty((size_px, size_px, 3), np.uint8)
     labels = np.empty((size_px, size_px), np.uint8)
-    margin = round(_MARGIN_M / gsd_m)
-    for top in range(0, size_px, _TILE_PX):
-        for left in range(0, size_px, _TILE_PX):
-            rows, columns = min(_TILE_PX, size_px - top), min(_TILE_PX, size_px - left)
-            window = DrawnWindow(
-                (left - margin) * gsd_m - 0.5 * extent,
-                (top - margin) * gsd_m - 0.5 * extent,
-                columns + 2 * margin,
-                rows + 2 * margin,
-                gsd_m,
-            )
-            canvas = render(plan, window, seed, sun, look)
-            inner = (slice(margin, margin + rows), slice(margin, margin + columns))
-            image[top : top + rows, left : left + columns] = develop(canvas, look, seed)[inner]
-            labels[top : top + rows, left : left + columns] = canvas.labels[inner]
+    for rows, columns in product(tiles_of(size_px, _TILE_PX), repeat=2):
+        image[rows, columns], labels[rows, columns] = town.draw(rows, columns, gsd_m)
     return image, labels
 
 
-def plan_town(rng: np.random.Generator, season: str, extent_m: float) -> Plan:
+def plan_town(
+    rng: np.random.Generator, season: str, extent_m: float, district: District = DISTRICTS[MIXED]
+) -> Plan:
     """Plan districts of different layouts, open ones next to built ones, often with a river."""
     warp = Warp(
         angle_rad=float(rng.uniform(0.0, 2.0 * pi)),
@@ -75,15 +151,16 @@ def plan_town(rng: np.random.Generator, season: str, extent_m: float) -> Plan:
     start = int(rng.integers(2))
     for i in range(count):
         for j in range(count):
-            kinds = _OPEN if (i + j + start) % 2 == 0 else _BUILT
+            is_open = (i + j + start) % 2 == 0
+            kinds = district.open_layouts if is_open else district.built_layouts
             layout = kinds[int(rng.integers(len(kinds)))]
-            district = Block(
+            block = Block(
                 float(x[i]) + 5.0, float(y[j]) + 5.0, float(x[i + 1]) - 5.0, float(y[j + 1]) - 5.0
             )
-            fill_district(furnisher, district, layout, 1e9, ragged=False)
+            fill_district(furnisher, block, layout, 1e9, ragged=False)
     for k in range(1, count):
         for vertical, line in ((True, float(x[k])), (False, float(y[k]))):
             run_avenue(furnisher, vertical, line, (-half, half), 10.0)
-    if rng.random() < 0.7:
-        add_river(furnisher, area, (0.06, 0.10))
+    if rng.random() < district.river:
+        add_river(furnisher, area, district.river_width)
     return plan

@@ -15,8 +15,9 @@ from geometry_msgs.msg import PoseStamped
 from rosgraph_msgs.msg import Clock
 
 from peace_ros.nodes.messages import pose_to_message, time_from_ns
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import CLOCK, POSE
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.runtime import run
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
 from peace_ros.simulation.nodes.options import AUTOPILOT_SIM, AutopilotSimOptions
 
@@ -37,6 +38,8 @@ class AutopilotSimNode(PeaceNode):
         parameters = self.filled(AutopilotParameters)
         chosen = self.filled(AutopilotSimOptions)
         self._sim = AutopilotSim(parameters)
+        if chosen.ground_station_address is not None:
+            self._sim.call(*chosen.ground_station_address)
         self._pose_period_ns = round(1e9 / chosen.pose_rate)
         self._pose_due_ns = 0
         self._clock_due_s = 0.0

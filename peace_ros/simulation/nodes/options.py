@@ -11,6 +11,7 @@ from peace_ros.core.domain.camera import DISTORTION_SIZES
 from peace_ros.core.domain.parameters import ParameterSet, parameter
 from peace_ros.core.node_parameters import CameraOptions, Group
 from peace_ros.core.vehicle import AUTO, check_access
+from peace_ros.core.vehicle.transport import parse_url
 from peace_ros.simulation.autopilot import AutopilotParameters
 
 CAMERA_SYSTEM_ID = 254
@@ -113,6 +114,23 @@ class AutopilotSimOptions(ParameterSet):
     publish_clock: bool = parameter(
         False, 'Publish /clock also at speed 1 (at any other speed it always is)'
     )
+    ground_station: str = parameter(
+        'udpout:127.0.0.1:14550',
+        "Where it sends from the start, as the autopilots' own simulations do: "
+        'udpout:HOST:PORT, by default to the landing node; empty: it answers only',
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.ground_station and parse_url(self.ground_station)[0] != 'udpout':
+            raise ConfigurationError(
+                f'parameter ground_station = {self.ground_station!r}: write udpout:HOST:PORT'
+            )
+
+    @property
+    def ground_station_address(self) -> tuple[str, int] | None:
+        """Host and UDP port of the ground station, None without one."""
+        return parse_url(self.ground_station)[1:] if self.ground_station else None
 
 
 SATELLITE_VIEW: tuple[Group, ...] = (('', SatelliteViewOptions), ('', CameraOptions))

@@ -18,8 +18,8 @@ from peace_ros.core.messages import pose_from_message
 from peace_ros.core.vehicle import VehicleLink, VehicleParameters, open_vehicle
 from peace_ros.nodes.connection import Connection
 from peace_ros.nodes.messages import pose_to_message
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import COMMAND, POSE, POSE_IN
-from peace_ros.nodes.runtime import PeaceNode
 from peace_ros.simulation.nodes.messages import BODY_FRAME, transform_from_pose
 from peace_ros.simulation.nodes.options import CAMERA_SYSTEM_ID
 from peace_ros.simulation.nodes.twist_vehicle import TwistVehicle

@@ -17,8 +17,9 @@ from peace_ros.core.domain import PeaceError, Pose
 from peace_ros.core.messages import CAMERA_FRAME
 from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.nodes.messages import camera_info, image_message
+from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import IMAGE_OUT, RESULT
-from peace_ros.nodes.runtime import PeaceNode, run
+from peace_ros.nodes.runtime import run
 from peace_ros.nodes.worker import NewestWorker
 from peace_ros.simulation.camera import NadirCamera
 from peace_ros.simulation.nodes.options import SATELLITE_VIEW, SatelliteViewOptions

@@ -6,8 +6,8 @@ from math import inf, nan
 
 import pytest
 
-from peace_ros.core.domain import Pose, Telemetry
-from peace_ros.core.landing import LandingParameters, State, engagement_problem
+from peace_ros.core.domain import Level, Pose, Telemetry
+from peace_ros.core.landing import LandingParameters, State, engagement_problem, readiness
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 POSE = Pose(0, 0.0, 0.0, -100.0, LEVEL, 100.0)
@@ -49,3 +49,20 @@ def test_says_why_a_landing_cannot_begin(told, telemetry_age_s, map_age_s, word)
     )
     assert word in problem
     assert bool(problem) == bool(word)
+
+
+@pytest.mark.parametrize(
+    ('state', 'several', 'problem', 'level', 'words'),
+    [
+        (State.IDLE, '', '', Level.OK, 'IDLE, ready'),
+        (State.IDLE, '', 'not armed', Level.WARN, 'IDLE, not ready: not armed'),
+        (State.ABORTED, '', '', Level.ERROR, 'ABORTED, ready'),
+        (State.LANDING, '', 'under way', Level.OK, 'LANDING'),
+        (State.HOLD, '', 'no heatmap', Level.WARN, 'HOLD'),
+        (State.LANDING, '2 publishers', '', Level.ERROR, 'nothing is engaged: 2 publishers'),
+    ],
+)
+def test_readiness_is_the_level_of_the_landing(state, several, problem, level, words):
+    found = readiness(state, several, problem)
+    assert found.level is level
+    assert words in found.sentence

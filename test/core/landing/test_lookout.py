@@ -227,7 +227,7 @@ def test_a_descent_that_fails_closes_the_place_where_it_began(painted):
     assert not lookout.follow(State.LANDING, State.WAITING, 12 * S)
     assert lookout.follow(State.WAITING, State.CLIMBING, 13 * S)
     assert lookout.failed_sites == 1
-    (failed,) = lookout._memory.failed
+    (failed,) = lookout.memory.failed
     assert (failed.north_m, failed.east_m) == (site.north_m, site.east_m)
     assert failed.until_ns == 13 * S + round(P.failed_site_memory_s * S)
     seen = lookout.look(painted.stamp_ns, None, State.CLIMBING, 0.0)

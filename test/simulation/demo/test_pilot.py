@@ -65,7 +65,7 @@ def test_position_loss_takes_the_pose_away_and_guided_is_refused(flying, eventua
     result = link.request_control(by_person=True)
     assert not result
     assert 'no estimate of its position' in result.reason
-    assert 'GNSS, external navigation or optical flow' in link.position_problem
+    assert 'external navigation or optical flow' in link.position_problem
     forced = link.set_mode('GUIDED')
     assert forced.code == 4
     assert 'requires position' in forced.reason

@@ -14,13 +14,17 @@ from geometry_msgs.msg import PoseStamped, Twist
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 
-from peace_ros.core.domain import ConfigurationError, Pose, VehicleError, WorldError
+from peace_ros.core.domain import ConfigurationError, PeaceError, Pose, VehicleError, WorldError
 from peace_ros.core.domain.geometry import yaw_from_quaternion
 from peace_ros.core.messages import frame_from_message, ns_from_time, pose_from_message, stamp_ns_of
+from peace_ros.core.node_parameters import LandingOptions
+from peace_ros.core.vehicle import open_vehicle
 from peace_ros.nodes import qos
 from peace_ros.nodes.messages import pose_to_message
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
+from peace_ros.simulation.demo.isolation import free_udp_port
 from peace_ros.simulation.nodes.autopilot_sim import AutopilotSimNode
+from peace_ros.simulation.nodes.options import AutopilotSimOptions
 from peace_ros.simulation.nodes.satellite_view import SatelliteViewNode
 from peace_ros.simulation.nodes.twist_vehicle import TwistVehicle
 
@@ -204,6 +208,26 @@ def test_at_wall_speed_there_is_no_clock_and_stamps_are_of_the_node(bench):
     bench.until(lambda: len(poses) >= 10)
     assert not clocks
     assert abs(node.clock_ns() - stamp_ns_of(poses[-1])) < 5e9
+
+
+def test_the_autopilot_and_the_landing_find_each_other_by_default():
+    options, landing = AutopilotSimOptions(), LandingOptions()
+    assert options.ground_station.removeprefix('udpout:') == landing.mavlink.removeprefix('udpin:')
+    assert AutopilotParameters().port != options.ground_station_address[1]
+
+
+def test_the_autopilot_sends_to_a_ground_station_that_only_listens(bench):
+    port = free_udp_port()
+    bench.run(AutopilotSimNode, port=0, ground_station=f'udpout:127.0.0.1:{port}')
+    link = open_vehicle(f'udpin:127.0.0.1:{port}')
+    assert link.telemetry().mode
+    link.close()
+
+
+@pytest.mark.parametrize('given', ['127.0.0.1:14550', 'udpin:127.0.0.1:14550', 'udpout:14550'])
+def test_a_ground_station_that_cannot_be_sent_to_is_refused(bench, given):
+    with pytest.raises(PeaceError, match='udpout:HOST:PORT'):
+        bench.run(AutopilotSimNode, port=0, ground_station=given)
 
 
 def test_a_twist_vehicle_stops_when_nobody_speaks():

@@ -1,0 +1,39 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Prompt generator and segmentation in one process: an image is received and decoded once."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from peace_ros.nodes.node import PeaceNode
+from peace_ros.nodes.prompt_generator import PromptGeneratorNode
+from peace_ros.nodes.runtime import run
+from peace_ros.nodes.segmentation import SegmentationNode
+from peace_ros.nodes.sharing import SharedImages
+
+
+def create_nodes() -> tuple[PeaceNode, ...]:
+    """Create the nodes; segmentation subscribes to the images for both.
+
+    Raises:
+        PeaceError: as each of the nodes.
+    """
+    images = SharedImages()
+    segmentation = SegmentationNode(images=images)
+    try:
+        return segmentation, PromptGeneratorNode(images=images)
+    except BaseException:
+        segmentation.close()
+        segmentation.destroy_node()
+        raise
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the nodes until SIGINT or SIGTERM."""
+    return run(create_nodes, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

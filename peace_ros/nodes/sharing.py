@@ -1,0 +1,46 @@
+# Copyright 2026 The peace_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Images that several nodes of one process share: received once and decoded once."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from peace_ros.core.domain import Frame
+from peace_ros.core.messages import frame_from_message
+
+_Take = Callable[[Any], None]
+
+
+class SharedImages:
+    """Hands each image message to all who take it; may be used from several threads."""
+
+    def __init__(self) -> None:
+        self._takers: list[_Take] = []
+        self._lock = threading.Lock()
+        self.decode: Callable[[Any], Frame] = frame_from_message
+        """By whoever subscribes, who may know the camera."""
+        self._decoded: tuple[Any, Frame] | None = None
+
+    def add(self, take: _Take) -> None:
+        """Hand the images from now on to ``take``, too."""
+        self._takers.append(take)
+
+    def remove(self, take: _Take) -> None:
+        """Hand it no further image."""
+        if take in self._takers:
+            self._takers.remove(take)
+
+    def offer(self, message: Any) -> None:
+        """Hand on an image."""
+        for take in tuple(self._takers):
+            take(message)
+
+    def frame(self, message: Any) -> Frame:
+        """Return the frame of an image; the next one who asks for the same image gets it, too."""
+        with self._lock:
+            if self._decoded is None or self._decoded[0] is not message:
+                self._decoded = (message, self.decode(message))
+            return self._decoded[1]
