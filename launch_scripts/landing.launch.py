@@ -66,7 +66,12 @@ ARGUMENTS: tuple[tuple[str, Any, str, list[str] | None], ...] = (
     ),
     ('image', 'image', 'Topic of the nadir camera (sensor_msgs/Image)', None),
     ('image_transport', '', f'raw or compressed (JPEG, PNG on image/compressed){_UNSET}', None),
-    ('camera_info', 'camera_info', 'Topic of its calibration (sensor_msgs/CameraInfo)', None),
+    (
+        'camera_info',
+        'camera_info',
+        'Topic of its calibration, where image has no /; else the camera_info beside the image',
+        None,
+    ),
     ('depth', 'depth', 'Topic of depth images (sensor_msgs/Image), where there are any', None),
     ('interface', '', f'mavlink, or twist for simulators without MAVLink{_UNSET}', None),
     ('mavlink', '', f'Where the autopilot is, such as udpin:0.0.0.0:14550{_UNSET}', None),
