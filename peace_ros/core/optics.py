@@ -25,6 +25,10 @@ Picture = NDArray[np.uint8]
 
 _WIDEST = tan(radians(80.0))
 """No ray that is farther off the axis is projected onto the ground."""
+_NARROWEST = 0.01
+"""In focal lengths: no picture is narrower than half a degree."""
+_NO_ROTATION = 0.01
+"""Rows of a rotation have length 1 and right angles, up to rounding."""
 _STEPS, _DIRECTIONS = 400, 16
 _ZERO, _NO_TURN = np.zeros((3, 1)), np.eye(3)
 _PRECISE = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 50, 1e-9)
@@ -137,19 +141,27 @@ def check_lens(camera: Camera) -> None:
     """Refuse a calibration that cannot be that of the picture.
 
     Raises:
-        ImageError: the principal point is not in it, or the distortion is not one-to-one up to its
-            nearest edge.
+        ImageError: the principal point is not in it, the distortion is not one-to-one up to its
+            nearest edge, it sees next to nothing, or its rectification is no rotation.
     """
+    turn = np.reshape(camera.rectification, (3, 3))
+    if not np.allclose(turn @ turn.T, np.eye(3), atol=_NO_ROTATION):
+        raise ImageError(
+            f'calibration with rectification {camera.rectification}: it must be a rotation: '
+            'calibrate the camera again'
+        )
     (cu, cv), (fx, fy) = camera.centre_px, camera.focal_xy_px
     edge = min(cu / fx, (camera.width_px - 1 - cu) / fx, cv / fy, (camera.height_px - 1 - cv) / fy)
     limit = np.array([[0.999 * widest_ray(camera)], [0.0]])
     reach = float(np.hypot(*_distorted(camera, limit))[0])
-    if not 0.0 < edge <= reach:
+    narrow = min(camera.width_px / fx, camera.height_px / fy)
+    if not (0.0 < edge <= reach and narrow >= _NARROWEST):
         raise ImageError(
             f'calibration with centre {camera.centre_px} px in {camera.width_px} x '
             f'{camera.height_px} px and {camera.distortion or "no distortion"}: the nearest edge '
             f'is {edge:.2f} focal lengths from the centre, directions are unique from 0 to '
-            f'{reach:.2f}: calibrate the camera again'
+            f'{reach:.2f}, and the shorter side is {narrow:.2g} focal lengths (at least '
+            f'{_NARROWEST}): calibrate the camera again'
         )
 
 

@@ -29,6 +29,8 @@ _REAL = re.compile(
 )
 _LONGEST_NUMBER = 64
 _PLAIN = '!plain'
+_DAMAGE = (yaml.YAMLError, ValueError, LookupError, AttributeError, RecursionError)
+"""All that PyYAML raises on text that is no YAML, or on values that do not fit their tags."""
 
 
 def _scalar(text: str) -> bool | int | float | str:
@@ -90,7 +92,7 @@ def read_yaml(path: Path, remedy: str) -> Any:
         return yaml.load(path.read_text(encoding='utf-8'), Loader=_Loader)  # noqa: S506 (a SafeLoader)
     except OSError as error:
         raise ConfigurationError(f'{path}: {error.strerror}; {remedy}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except _DAMAGE as error:
         raise ConfigurationError(f'{path}: not usable YAML ({error}); {remedy}') from error
 
 
@@ -102,13 +104,18 @@ def read_sections(path: Path) -> Sections:
 
     """
     content = read_yaml(path, _REMEDY)
-    sections = dict(_sections_of(content)) if isinstance(content, dict) else {}
-    if not sections:
-        raise ConfigurationError(f'{path} holds no node: {_REMEDY}')
-    for section, values in sections.items():
-        if not isinstance(values, dict):
-            raise ConfigurationError(f'{path}: {section} has no ros__parameters: {_REMEDY}')
-    return {section: _flat(values) for section, values in sections.items()}
+    try:
+        sections = dict(_sections_of(content)) if isinstance(content, dict) else {}
+        if not sections:
+            raise ConfigurationError(f'{path} holds no node: {_REMEDY}')
+        for section, values in sections.items():
+            if not isinstance(values, dict):
+                raise ConfigurationError(f'{path}: {section} has no ros__parameters: {_REMEDY}')
+        return {section: _flat(values) for section, values in sections.items()}
+    except RecursionError as error:
+        raise ConfigurationError(
+            f'{path}: not usable YAML (an alias is inside of what it names); {_REMEDY}'
+        ) from error
 
 
 def addresses(section: str, node: str) -> bool:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,9 @@ class EngagementServices:
         self._node, self._access = node, access
         self._auto_due = auto
         self._thread: GuardedThread | None = None
+        self._lock = threading.Lock()
+        """Held while a landing begins or ends."""
+        self._disengagements = 0
         beside = MutuallyExclusiveCallbackGroup()
         for name, callback in (('engage', self._on_engage), ('disengage', self._on_disengage)):
             self._node.create_service(Trigger, f'~/{name}', callback, callback_group=beside)
@@ -63,27 +67,41 @@ class EngagementServices:
 
     def _engage_for_person(self) -> str:
         problem = self._engage(by_person=True)
-        instead = self._access.hold_level() if problem else ''
+        instead = self._access.hold_level() if problem and self._node.is_active else ''
         return f'{problem}; {instead}' if instead else problem
 
     def _engage(self, *, by_person: bool) -> str:
         """Request control once; return why the landing did not begin, empty when it began."""
+        before = self._disengagements
         problem = self._node.check_engagement()
         link = self._access.link
         if not problem and link is not None:
             problem = _request_control(link, by_person=by_person)
-        problem = problem or self._node.begin()
+        if not problem:
+            problem = self._begin(before)
+            if problem and link is not None:
+                # It obeys us now, and nobody would command it.
+                problem = f'{problem}; {_request_hold(link)}'
         if problem:
             self._node.get_logger().warning(f'not engaged: {problem}')
         else:
             self._node.get_logger().info('engaged')
         return problem
 
+    def _begin(self, disengagements: int) -> str:
+        """Begin unless somebody has disengaged since; return why not, empty when it began."""
+        with self._lock:
+            if self._disengagements != disengagements:
+                return 'disengaged while control was requested'
+            return self._node.begin()
+
     def _on_disengage(
         self, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
         self._auto_due = False
-        was_flying = self._node.end_landing()
+        with self._lock:
+            self._disengagements += 1
+            was_flying = self._node.end_landing()
         response.success = True
         response.message = 'disengaged: the vehicle stops and holds' if was_flying else 'was idle'
         self._node.get_logger().info(response.message)
@@ -97,3 +115,12 @@ def _request_control(link: VehicleLink, *, by_person: bool) -> str:
     except VehicleError as error:
         return str(error)
     return '' if result else f'control {result.answer.value}: {result.reason}'
+
+
+def _request_hold(link: VehicleLink) -> str:
+    """Ask for the autopilot's own hold mode; return the result as a sentence."""
+    try:
+        result = link.request_hold()
+    except VehicleError as error:
+        return f'hold mode was not requested: {error}'
+    return 'the vehicle holds' if result else f'hold mode {result.answer.value}: {result.reason}'

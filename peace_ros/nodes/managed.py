@@ -92,8 +92,8 @@ class ManagedNode(LifecycleNodeMixin, PeaceNode):  # type: ignore[misc]
 
     def on_cleanup(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Free."""
-        self.is_configured = False
         self._free()
+        self.is_configured = False
         return self._told(SUCCESS)
 
     def on_shutdown(self, _state: LifecycleState) -> TransitionCallbackReturn:
@@ -108,8 +108,8 @@ class ManagedNode(LifecycleNodeMixin, PeaceNode):  # type: ignore[misc]
             self.is_active = False
             self._attempt(self.deactivate)
         if self.is_configured:
+            self._attempt(self.cleanup)
             self.is_configured = False
-            self.cleanup()
 
     def _attempt(self, step: Callable[[], None]) -> TransitionCallbackReturn:
         """Take a step; a refusal leaves the state as it was, a defect ends the process."""
@@ -131,7 +131,7 @@ class ManagedNode(LifecycleNodeMixin, PeaceNode):  # type: ignore[misc]
         return {*self.subscriptions, *self.publishers, *self.services, *self.timers}
 
     def _free(self) -> None:
-        self.cleanup()
+        self._attempt(self.cleanup)  # rclpy would drop an exception without a word
         for entities, destroy in (
             (self.subscriptions, self.destroy_subscription),
             (self.publishers, self.destroy_publisher),

@@ -20,6 +20,8 @@ from peace_ros.nodes.worker import NewestWorker
 
 _KEPT = 64
 """Prompts that wait; more frames than this never lie between a frame and its prompt."""
+_REMEMBERED = 1024
+"""Sentences that are known to be embedded; with more, all are looked up again."""
 
 
 def static_prompt(options: SegmentationOptions) -> Prompt | None:
@@ -163,5 +165,7 @@ class PromptInput:
 
     def _prepare(self, prompt: Prompt) -> None:
         self._embed(prompt)
+        if len(self._embedded) >= _REMEMBERED:
+            self._embedded.clear()
         self._embedded.add(prompt.template)
         self._board.put(prompt)

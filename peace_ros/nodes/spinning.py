@@ -48,4 +48,6 @@ def spin_until_ended(node: PeaceNode, *others: PeaceNode) -> None:
     if spinner.is_alive():
         print('a callback does not end: the process ends without it', file=sys.stderr, flush=True)
         os._exit(EXIT_FAILED)
+    for each in (node, *others):
+        each.end_if_failed()
     executor.shutdown()

@@ -17,6 +17,8 @@ from peace_ros.core.vehicle import Answer, LineCounts, RequestResult
 from peace_ros.nodes.messages import setpoint_to_body_twist
 
 _POSES = 256
+_RESTART_NS = 1_000_000_000
+"""A clock that goes back by more than this was restarted."""
 _NO_MODES = RequestResult(Answer.REFUSED, 'a vehicle with a velocity topic has no modes')
 
 
@@ -42,8 +44,11 @@ class TwistLink:
         self._received_ns = 0
 
     def add_pose(self, pose: Pose) -> None:
-        """Take a pose that came over a topic."""
+        """Take a pose that came over a topic; one that is not newer is no sign of life."""
         with self._lock:
+            newest = self._newest
+            if newest is not None and 0 <= newest.stamp_ns - pose.stamp_ns <= _RESTART_NS:
+                return
             self._poses.append(pose)
             self._newest, self._received_ns = pose, time.monotonic_ns()
 

@@ -116,6 +116,9 @@ def test_a_lens_without_distortion_has_no_limit_of_its_own() -> None:
         replace(PINHOLE, centre_px=(-5.0, 179.5)),
         replace(PINHOLE, centre_px=(319.5, 400.0)),
         replace(PINHOLE, distortion=Distortion('plumb_bob', (-2.0, 0.0, 0.0, 0.0, 0.0))),
+        replace(PINHOLE, focal_xy_px=(320.0, 1e9)),
+        replace(PINHOLE, rectification=(2.0,) * 9),
+        replace(PINHOLE, rectification=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)),
     ],
 )
 def test_a_calibration_that_cannot_be_that_of_the_picture_is_refused(wrong: Camera) -> None:

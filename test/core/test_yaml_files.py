@@ -90,3 +90,29 @@ def test_a_number_of_any_length_is_read(tmp_path):
     path = tmp_path / 'a.yaml'
     path.write_text(f'a: {"9" * 5000}\nb: 0x{"f" * 5000}\n')
     assert read_yaml(path, '') == {'a': '9' * 5000, 'b': '0x' + 'f' * 5000}
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        'a: !!int x\n',
+        'a: !!int ""\n',
+        'a: !!float x\n',
+        'a: !!bool x\n',
+        'a: !!timestamp x\n',
+        f'a: {"[" * 2000}{"]" * 2000}\n',
+    ],
+)
+def test_a_value_that_does_not_fit_its_tag_is_refused(tmp_path, text):
+    path = tmp_path / 'a.yaml'
+    path.write_text(text)
+    with pytest.raises(ConfigurationError, match='not usable YAML'):
+        read_yaml(path, 'give it once')
+
+
+@pytest.mark.parametrize('text', ['a: &a {b: *a}\n', 'a:\n  ros__parameters: &a\n    b: *a\n'])
+def test_a_section_that_holds_itself_is_refused(tmp_path, text):
+    path = tmp_path / 'a.yaml'
+    path.write_text(text)
+    with pytest.raises(ConfigurationError, match='not usable YAML'):
+        read_sections(path)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import gc
 import weakref
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -16,8 +17,10 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from sensor_msgs.msg import Image
 
 from peace_ros.core.domain import Heatmap, Pose, Prompt
+from peace_ros.core.node_parameters import groups_of
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
+from peace_ros.nodes.managed import ManagedNode
 from peace_ros.nodes.messages import pose_to_message
 from peace_ros.nodes.prompt_generator import PromptGeneratorNode
 from peace_ros.nodes.segmentation import SegmentationNode
@@ -173,3 +176,28 @@ def test_a_shutdown_during_a_landing_leaves_zero(bench, manager):
     assert manager('landing').change('shutdown')
     assert node.begin()
     assert 'finalized' in node.check_engagement()
+
+
+@pytest.mark.parametrize('transition', ['cleanup', 'shutdown'])
+def test_a_defect_while_things_are_freed_is_not_swallowed(bench, manager, transition):
+    configured = []
+
+    class Broken(ManagedNode):
+        def __init__(self, **options):
+            super().__init__('broken', *groups_of('prompt_generator'), **options)
+            self.start()
+
+        def cleanup(self):
+            raise RuntimeError('defect')
+
+        def last_steps(self, _sentence):
+            configured.append(self.is_configured)
+            return ()
+
+    node = bench.run(Broken)
+    manager = manager('broken')
+    assert manager.change('deactivate')
+    with suppress(RuntimeError):  # the bench may meet the defect before the answer
+        manager.change(transition)
+    assert isinstance(node.failure, RuntimeError)
+    assert configured == [True], 'a landing node can still stop its vehicle'

@@ -7,8 +7,13 @@ from __future__ import annotations
 import threading
 import time
 
+import pytest
+
 from peace_ros.core.domain import Prompt
-from peace_ros.nodes.prompts import PromptBoard
+from peace_ros.core.node_parameters import SegmentationOptions
+from peace_ros.nodes import prompts
+from peace_ros.nodes.messages import prompt_to_message
+from peace_ros.nodes.prompts import PromptBoard, PromptInput
 
 
 def prompt(stamp_ns: int) -> Prompt:
@@ -87,3 +92,59 @@ def test_after_a_frame_in_vain_it_waits_no_longer_until_a_prompt_is_in_time_agai
     board.put(prompt(600 * MS))
     threading.Timer(0.05, lambda: board.put(prompt(800 * MS))).start()
     assert board.take(800 * MS, 10.0) == prompt(800 * MS)
+
+
+class Subscriber:
+    """What a prompt input asks of its node."""
+
+    diagnostics = property(lambda self: self)
+
+    def watch(self, _topic, unless):
+        assert not unless()
+        return lambda _stamp_ns: None
+
+    def create_subscription(self, _kind, _topic, callback, _profile):
+        self.publish = callback
+
+    def fail(self, error):
+        raise error
+
+
+@pytest.fixture
+def embedded():
+    return []
+
+
+@pytest.fixture
+def subscriber():
+    return Subscriber()
+
+
+@pytest.fixture
+def prompt_input(subscriber, embedded):
+    prompt_input = PromptInput(subscriber, SegmentationOptions(), embedded.append, pytest.fail)
+    yield prompt_input
+    prompt_input.close()
+
+
+def hear(subscriber: Subscriber, prompt_input: PromptInput, sentence: str, stamp_ns: int) -> None:
+    subscriber.publish(prompt_to_message(Prompt(sentence, stamp_ns)))
+    deadline = time.monotonic() + 5.0
+    while prompt_input.take(stamp_ns) != (Prompt(sentence, stamp_ns), True):
+        assert time.monotonic() < deadline
+
+
+def test_a_sentence_is_embedded_once_while_few_are_used(subscriber, prompt_input, embedded):
+    for number in range(6):
+        hear(subscriber, prompt_input, f'{{term}} {number % 2}', number)
+    assert len(embedded) == 2
+
+
+def test_a_flood_of_sentences_does_not_fill_the_memory(
+    subscriber, prompt_input, embedded, monkeypatch
+):
+    monkeypatch.setattr(prompts, '_REMEMBERED', 3)
+    for number in range(12):
+        hear(subscriber, prompt_input, f'{{term}} {number}', number)
+        assert len(prompt_input._embedded) <= 3
+    assert len(embedded) == 12

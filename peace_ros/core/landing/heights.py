@@ -77,6 +77,11 @@ class _Source:
             self.doubt = sentence
         return off_m <= limit_m
 
+    def pause(self) -> None:
+        """Say nothing at this moment: a doubt needs agreement without a gap to end."""
+        if self.doubt:
+            self._turned_ns = None
+
 
 class HeightWatch:
     """Compares the altitude with all other heights."""
@@ -121,6 +126,8 @@ class HeightWatch:
             )
             off_m = abs(height_m - altitude_m)
             agree &= source.judge(now_ns, off_m, limit_m, sentence)
+        for name in self._sources.keys() - heights_m.keys():
+            self._sources[name].pause()
         lowest_m = min(altitude_m, _lowest_m(heard))
         return HeightSight(
             problem='; '.join(each.doubt for each in self._sources.values() if each.doubt),

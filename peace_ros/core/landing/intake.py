@@ -23,6 +23,8 @@ from peace_ros.core.landing.poses import Miss, PoseHistory, jump_m
 from peace_ros.core.mapping import RefusedLookError, SafetyMap
 
 _PENDING_LIMIT = 4
+_REASONS = 64
+"""So many are counted apart."""
 _NO_MOUNT = 'how the camera is mounted is not known yet'
 
 
@@ -250,5 +252,7 @@ class HeatmapIntake:
 
     def reject(self, reason: str) -> None:
         """Count a heatmap that is not used, and remember why."""
-        self.counts[reason] += 1
+        # Reasons may hold sizes and names of frames, of which there is no end.
+        is_known = reason in self.counts or len(self.counts) < _REASONS
+        self.counts[reason if is_known else 'other reasons'] += 1
         self._last_rejection = reason

@@ -61,7 +61,9 @@ def height_change(before: View, after: View, camera: Camera) -> HeightChange | M
         after: The same, of a later moment.
         camera: That of the full frames.
     """
-    if before.grey.shape == after.grey.shape and np.array_equal(before.grey, after.grey):
+    if before.grey.shape != after.grey.shape:
+        return Mismatch.DIFFERENT
+    if np.array_equal(before.grey, after.grey):
         return Mismatch.SAME
     corners = cv2.goodFeaturesToTrack(before.grey, _CORNERS, _CORNER_QUALITY, _CORNER_DISTANCE_PX)
     if corners is None or len(corners) < _FEWEST:
@@ -72,10 +74,10 @@ def height_change(before: View, after: View, camera: Camera) -> HeightChange | M
     if guess is None:
         return Mismatch.HORIZON
     seen = _followed(before.grey, after.grey, corners, guess.reshape(-1, 1, 2))
+    if len(seen[0]) < _FEWEST:
+        return Mismatch.DIFFERENT
     there, here = (_on_ground(points, *by) for points, by in zip(seen, seen_from, strict=True))
-    if there is None or here is None:
-        return Mismatch.HORIZON
-    return _fitted(there, here, _OFF_PX / _one_above(before, camera)[0].focal_px)
+    return _fitted(there, here, _OFF_PX / seen_from[0][0].focal_px)
 
 
 def _one_above(view: View, camera: Camera) -> tuple[Camera, Pose]:
@@ -123,10 +125,10 @@ def _followed(
     return corners.reshape(-1, 2)[kept], found.reshape(-1, 2)[kept]
 
 
-def _fitted(there: Points, here: Points, off: float) -> HeightChange | Mismatch:
+def _fitted(there: Points | None, here: Points | None, off: float) -> HeightChange | Mismatch:
     """Return the change that most points agree with, within a distance in heights."""
-    if len(there) < _FEWEST:
-        return Mismatch.DIFFERENT
+    if there is None or here is None:
+        return Mismatch.HORIZON
     fit, agrees = cv2.estimateAffinePartial2D(
         there, here, method=cv2.RANSAC, ransacReprojThreshold=off
     )

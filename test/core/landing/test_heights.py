@@ -89,6 +89,19 @@ def test_heights_agree_again_within_a_smaller_limit_and_after_a_while(watched: W
     assert not watched.see(40.0, pictures(38.0), for_s=0.3).problem
 
 
+def test_who_is_silent_in_between_does_not_agree_for_so_long(watched: Watched) -> None:
+    assert watched.see(40.0, pictures(30.0), for_s=2.0).problem
+    for _ in range(4):
+        assert watched.see(40.0, pictures(40.0)).problem
+        assert watched.see(40.0, for_s=5.0).problem
+
+
+def test_gaps_of_the_position_do_not_delay_a_doubt(watched: Watched) -> None:
+    watched.see(40.0, pictures(30.0), for_s=0.6)
+    watched.see(None, pictures(30.0))
+    assert watched.see(40.0, pictures(30.0), for_s=0.6).problem
+
+
 def test_a_doubt_outlives_its_source(watched: Watched) -> None:
     assert watched.see(40.0, pictures(30.0), for_s=2.0).problem
     assert watched.see(40.0, for_s=60.0).problem

@@ -299,3 +299,12 @@ def test_pictures_and_depth_of_another_shape_are_counted_and_not_used(intake):
     intake.add_depth(DepthImage(np.full((36, 64), 9.0, np.float32), round(2.0 * S)))
     assert intake.counts['picture of another shape than the frames'] == 1
     assert intake.counts['depth of another shape than the frames'] == 1
+
+
+def test_reasons_without_end_do_not_fill_the_memory(intake):
+    for number in range(1000):
+        intake.reject(f'the frames have {number} px')
+    assert len(intake.counts) < 100
+    assert intake.counts['the frames have 0 px'] == 1
+    assert sum(intake.counts.values()) == 20 + 1000
+    assert intake.last_rejection == 'the frames have 999 px'

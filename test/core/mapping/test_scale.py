@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from peace_ros.core.domain import Camera
+from peace_ros.core.domain import Camera, Distortion
 from peace_ros.core.mapping import HeightChange, Mismatch, View, height_change, small_grey
 from peace_ros.simulation import NadirCamera, draw_world
 
@@ -94,3 +94,19 @@ def test_a_camera_at_the_horizon_says_nothing(view_from):
     before = view_from(30.0)
     after = replace(view_from(28.0), pose=view_from(30.0, pitch=70.0).pose)
     assert height_change(before, after, CAMERA) is Mismatch.HORIZON
+
+
+@pytest.mark.parametrize(
+    'lens',
+    [None, Distortion('plumb_bob', (-0.1, 0.01, 0.0, 0.0)), Distortion('equidistant', (0.01,) * 4)],
+)
+def test_a_lens_that_is_covered_in_flight_says_nothing(view_from, lens):
+    before = view_from(30.0)
+    dark = replace(before, grey=np.zeros_like(before.grey))
+    assert height_change(before, dark, replace(CAMERA, distortion=lens)) is Mismatch.DIFFERENT
+
+
+def test_pictures_of_another_size_say_nothing(view_from):
+    before = view_from(30.0)
+    smaller = replace(before, grey=before.grey[:-2])
+    assert height_change(before, smaller, CAMERA) is Mismatch.DIFFERENT
