@@ -41,7 +41,7 @@ OF_LANDING = {
     'tf_child': str,
     **OF_PERCEPTION,
 }
-TOPICS = ('image', 'camera_info', 'depth', 'pose', 'cmd_vel')
+TOPICS = ('image', 'depth', 'pose', 'cmd_vel')
 
 _UNSET = '; empty: as in params_file, or the default of the node'
 ARGUMENTS: tuple[tuple[str, Any, str, list[str] | None], ...] = (
@@ -66,7 +66,7 @@ ARGUMENTS: tuple[tuple[str, Any, str, list[str] | None], ...] = (
     ),
     ('image', 'image', 'Topic of the nadir camera (sensor_msgs/Image)', None),
     ('image_transport', '', f'raw or compressed (JPEG, PNG on image/compressed){_UNSET}', None),
-    ('camera_info', 'camera_info', 'Topic of its calibration (sensor_msgs/CameraInfo)', None),
+    ('camera_info', '', 'Topic of its calibration; empty: the camera_info beside the image', None),
     ('depth', 'depth', 'Topic of depth images (sensor_msgs/Image), where there are any', None),
     ('interface', '', f'mavlink, or twist for simulators without MAVLink{_UNSET}', None),
     ('mavlink', '', f'Where the autopilot is, such as udpin:0.0.0.0:14550{_UNSET}', None),
@@ -102,6 +102,12 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
             )
         files.append(given['params_file'])
 
+    # The nodes ask for the topic beside the image, as image_transport has it.
+    beside = f'{given["image"].rpartition("/")[0]}/camera_info'
+    if '/' not in given['image']:
+        beside = 'camera_info'
+    calibration = [(beside, given['camera_info'])] if given['camera_info'] else []
+
     def create(name: str, arguments: dict[str, type], *, respawn: bool) -> Node:
         chosen = {
             each: given[each] == 'true' if kind is bool else given[each]
@@ -119,6 +125,7 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
             remappings=[
                 *((topic, given[topic]) for topic in TOPICS),
                 ('image/compressed', f'{given["image"]}/compressed'),
+                *calibration,
             ],
             ros_arguments=['--log-level', given['log_level']],
             respawn=respawn,

@@ -91,6 +91,8 @@ def benchmark(
             f'--clipseg {clipseg or "(random)"} with --source {source}: the reference must have '
             'the same weights; give both or neither'
         )
+    for bundle in filter(None, (clipseg, clip)):
+        Bundle.load(bundle)  # refused now, not after minutes in a process of its own
     if sweep:
         _sweep(clipseg, work, threads, table, json_file)
         return

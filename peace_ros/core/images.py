@@ -14,6 +14,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import simplejpeg
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
@@ -168,7 +169,9 @@ def eight_bits(values: NDArray[Any]) -> NDArray[np.uint8]:
 def rgb_from_compressed(kind: str, data: Any) -> NDArray[np.uint8]:
     """Return the height x width x 3 RGB array of a JPEG or PNG.
 
-    The size is looked at before memory is taken for it. OpenCV would fill what a truncated JPEG
+    The size is looked at before memory is taken for it. A JPEG that lost a part of its middle is
+    a warning to most decoders, which shift the rest of the picture; to simplejpeg it is an error.
+    OpenCV would fill what a truncated JPEG
     lacks with grey and call it a success; Pillow refuses it.
 
     Args:
@@ -191,6 +194,8 @@ def rgb_from_compressed(kind: str, data: Any) -> NDArray[np.uint8]:
                 raise ImageError(
                     f'{told} has pixels of kind {image.mode}: publish 8 bits per colour'
                 )
+            if image.format == 'JPEG':
+                return np.asarray(simplejpeg.decode_jpeg(encoded, 'RGB', strict=True))
             return np.asarray(image.convert('RGB'))
     except UnidentifiedImageError as error:
         raise ImageError(

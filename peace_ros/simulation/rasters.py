@@ -36,7 +36,7 @@ _SAME = 0.01
 """Relative difference of two lengths that count as equal."""
 _NORTH_DEG = 10.0
 """Angle between up and north that still counts as north: the convergence of usual projections."""
-_GSD_REMEDY = 'give the ground sampling distance in metres per pixel'
+_GSD_REMEDY = 'give gsd, the ground sampling distance in metres per pixel'
 
 
 class RasterError(WorldError):

@@ -4,14 +4,12 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
 
 from peace_ros.core.domain import Health, Level
 from peace_ros.core.health import InputWatch, WorkHealth
 
-NOW_NS = time.time_ns()
+NOW_NS = 1_800_000_000 * 10**9
 TOPIC = '/camera/image_raw'
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from array import array
+from io import BytesIO
 from zlib import crc32
 
 import cv2
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image
 
 from peace_ros.core.domain import ImageError
 from peace_ros.core.images import (
@@ -103,6 +105,26 @@ def test_refuses_a_truncated_image(kind, part):
 def test_refuses_a_jpeg_that_lacks_its_last_byte():
     with pytest.raises(ImageError, match='truncated'):
         rgb_from_compressed('jpeg', jpeg_from_rgb(scene(), 95)[:-1])
+
+
+@pytest.mark.parametrize(('begin', 'end'), [(0.3, 0.5), (0.2, 0.6), (0.4, 0.45)])
+def test_refuses_a_jpeg_that_lacks_its_middle(begin, end):
+    """Other decoders shift the rest of the picture and call it a success."""
+    noise = np.random.default_rng(1).integers(0, 255, (60, 60, 3), np.uint8)
+    whole = jpeg_from_rgb(cv2.resize(noise, (480, 480), interpolation=cv2.INTER_CUBIC), 90)
+    assert rgb_from_compressed('jpeg', whole).shape == (480, 480, 3)
+    damaged = whole[: int(begin * len(whole))] + whole[int(end * len(whole)) :]
+    with pytest.raises(ImageError, match=r'damaged or truncated .* check the link'):
+        rgb_from_compressed('jpeg', damaged)
+
+
+@pytest.mark.parametrize('mode', ['L', 'CMYK'])
+def test_a_jpeg_of_other_colours_comes_out_as_rgb(mode):
+    file = BytesIO()
+    Image.new(mode, (40, 30), 0 if mode == 'CMYK' else 255).save(file, 'JPEG')
+    image = rgb_from_compressed('jpeg', file.getvalue())
+    assert image.shape == (30, 40, 3)
+    assert image.min() >= 250
 
 
 def test_a_jpeg_may_be_followed_by_padding():

@@ -119,6 +119,21 @@ def test_arguments_that_are_parameters_exist_on_their_nodes(launch):
         assert given['image_transport'] == 'x'
 
 
+@pytest.mark.parametrize(
+    ('image', 'beside'),
+    [
+        ('image', 'camera_info'),
+        ('/camera/image_raw', '/camera/camera_info'),
+        ('front/image', 'front/camera_info'),
+    ],
+)
+def test_a_calibration_elsewhere_takes_the_place_of_that_beside_the_image(launch, image, beside):
+    for node in launch(f'image:={image}', 'camera_info:=/calibrated').values():
+        assert (beside, '/calibrated') in node['remappings']
+    for node in launch(f'image:={image}').values():
+        assert all('camera_info' not in topic for topic, _ in node['remappings'])
+
+
 def test_every_argument_changes_what_is_started(launch, tmp_path):
     path = tmp_path / 'mine.yaml'
     path.touch()

@@ -36,7 +36,7 @@ KEY_OF = {
     'hypothesis': 'python3-hypothesis',
 }
 """Package on PyPI -> its key in rosdistro's rosdep/python.yaml."""
-WITHOUT_KEY = ('tokenizers', 'ftfy', 'mcap')
+WITHOUT_KEY = ('tokenizers', 'ftfy', 'mcap', 'simplejpeg')
 BROUGHT_BY = {'zstandard': 'mcap'}
 
 

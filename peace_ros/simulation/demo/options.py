@@ -14,6 +14,7 @@ from typer import Option
 
 from peace_ros.core.domain import Camera, ConfigurationError, Distortion, VehicleError
 from peace_ros.core.node_parameters import CameraOptions
+from peace_ros.core.vehicle.transport import parse_url
 from peace_ros.recording.run_folder import create_run_folder
 
 DEFAULT_TIMEOUT_S = 330.0
@@ -68,7 +69,7 @@ class DemoOptions:
         Option(
             '--camera',
             metavar='WxH',
-            help='Size of the image; from 704 on it is also seen closer, in parts; takes time.',
+            help='Size of the image; 704x704, 640x480 and more are also seen in parts; takes time.',
         ),
     ] = '352x352'
     fov_deg: Annotated[
@@ -151,6 +152,9 @@ class DemoOptions:
                 '--mavlink and --pose-mavlink belong together: the landing node commands over the '
                 'first while the camera follows the pose on the second'
             )
+        for name, url in (('--mavlink', self.mavlink), ('--pose-mavlink', self.pose_mavlink)):
+            if url is not None:
+                _check_url(name, url)
         if self.mavlink == self.pose_mavlink and not (self.mavlink or 'udpout:').startswith(
             'udpout:'
         ):
@@ -257,6 +261,13 @@ def parse_distortion(text: str) -> Distortion:
             f'--distortion {text!r}: give numbers with commas between them, e.g. -0.2,0.04,0,0'
         ) from error
     return Distortion(model if colon else 'plumb_bob', coefficients)
+
+
+def _check_url(option: str, url: str) -> None:
+    try:
+        parse_url(url)
+    except VehicleError as error:
+        raise ConfigurationError(f'{option}: {error}') from error
 
 
 def is_on_this_machine(url: str) -> bool:

@@ -256,7 +256,7 @@ def test_an_approach_whose_site_got_lost_closes_the_place_that_it_aimed_at(paint
     assert look(lookout, painted, State.AIMING).verdict.site is None
     lookout.follow(State.AIMING, State.WAITING, 11 * S)
     lookout.follow(State.WAITING, State.RESTARTING, 12 * S)
-    (failed,) = lookout._memory.failed
+    (failed,) = lookout.memory.failed
     assert (failed.north_m, failed.east_m) == (site.north_m, site.east_m)
 
 

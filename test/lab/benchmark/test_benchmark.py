@@ -13,6 +13,7 @@ import typer
 from typer.testing import CliRunner
 
 from peace_ros.cli import benchmark as command
+from peace_ros.core.domain import BundleError
 from peace_ros.lab.benchmark.measure import Measured, Spread
 from peace_ros.lab.benchmark.ours import measure_blabberseg, measure_ours
 from peace_ros.lab.benchmark.report import clipseg_figures, fastsam_figures, markdown
@@ -100,6 +101,19 @@ def test_the_command_writes_table_and_json_and_keeps_other_objects(
     assert figures['clipseg']['frame_ms_p50'] == 100.0
     assert figures['fastsam'] == {'frame_ms_p50': 1.0}
     assert '| frame_ms_p50 | 100 |' in (tmp_path / 'table.md').read_text()
+
+
+@pytest.mark.parametrize('option', ['--clipseg', '--clip'])
+def test_a_bundle_that_does_not_exist_is_refused_before_anything_is_made(
+    option: str, tmp_path: Path
+) -> None:
+    app = typer.Typer()
+    app.command()(command.benchmark)
+    work = tmp_path / 'work'
+    result = CliRunner().invoke(app, [option, 'nothing-here', '--work', str(work)])
+    assert isinstance(result.exception, BundleError)
+    assert "no model bundle 'nothing-here'" in str(result.exception)
+    assert not work.exists()
 
 
 def fastsam_measured(name: str, frame_ms: float) -> Measured:

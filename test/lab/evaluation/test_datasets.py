@@ -124,7 +124,7 @@ def test_a_dataset_without_safe_ground_says_so(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ('options', 'complaint'),
     [
-        ({}, 'images from nowhere'),
+        ({}, 'images from no source: give exactly one'),
         ({'drawn': 2, 'dataset': 'vdd'}, 'images from --dataset and --drawn'),
         ({'dataset': 'vdd'}, 'without --root'),
         ({'images': Path('/')}, 'without --labels'),

@@ -52,6 +52,8 @@ def photo(tmp_path) -> Path:
         ({'pose_mavlink': 'udpin:127.0.0.1:1'}, '--mavlink'),
         ({'mavlink': 'udpin:127.0.0.1:1', 'pose_mavlink': 'udpin:127.0.0.1:1'}, 'second'),
         ({'mavlink': 'tcp:h:1', 'pose_mavlink': 'tcp:h:2', 'speed': 2.0}, '--speed'),
+        ({'mavlink': 'somewhere', 'pose_mavlink': 'tcp:h:2'}, "--mavlink: connection 'somewhere'"),
+        ({'mavlink': 'tcp:h:1', 'pose_mavlink': 'tcp:h'}, "--pose-mavlink: connection 'tcp:h'"),
         ({'autopilot': 'betaflight'}, '--autopilot'),
         ({'mavlink': 'tcp:h:1', 'pose_mavlink': 'tcp:h:2', 'autopilot': 'px4'}, '--autopilot'),
     ],

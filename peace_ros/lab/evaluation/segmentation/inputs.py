@@ -81,8 +81,8 @@ def open_source(inputs: EvaluationInputs) -> SampleSource:
     given = [name for name, there in ways.items() if there]
     if len(given) != 1:
         raise DatasetError(
-            f'images from {" and ".join(given) or "nowhere"}: give one of --dataset with --root, '
-            '--images with --labels, --manifest, --drawn N'
+            f'images from {" and ".join(given) or "no source"}: give exactly one of --dataset with '
+            '--root, --images with --labels, --manifest, --drawn N'
         )
     return sampled(_open(inputs), inputs.limit)
 
