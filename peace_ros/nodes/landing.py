@@ -149,6 +149,7 @@ class LandingNode(ManagedNode):
             if link is None:
                 return self._access.problem or 'the vehicle is not reached yet'
             self._sending.begin(link)
+            self._sending.submit(Setpoint(stamp_ns=0))  # from now on the dead-man watches
             self._core.engage()
         return ''
 
@@ -163,7 +164,7 @@ class LandingNode(ManagedNode):
         return was_flying
 
     def cleanup(self) -> None:
-        """Stop the vehicle: zero velocity, then no further set-point; release the connection."""
+        """Stop the vehicle (zero velocity and hold), then send nothing; release the connection."""
         with self._lock:
             if self._sending.stop():
                 self._access.stop_vehicle()

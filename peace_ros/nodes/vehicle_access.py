@@ -12,7 +12,7 @@ from typing import Any
 from geometry_msgs.msg import PoseStamped, Twist
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.core.domain import Pose, Setpoint, VehicleError
+from peace_ros.core.domain import Pose, VehicleError
 from peace_ros.core.landing import Decision, State
 from peace_ros.core.messages import pose_from_message, pose_from_transform
 from peace_ros.core.node_parameters import LandingOptions
@@ -135,16 +135,12 @@ class VehicleAccess:
         return f'holding level {result.answer.value}: {result.reason}'
 
     def stop_vehicle(self) -> None:
-        """Send zero velocity, if the vehicle still obeys us."""
+        """Send zero velocity and ask for the hold mode, if the vehicle still obeys us."""
         link = self.link
-        if link is None or link.taken_over:
-            return
-        told = link.telemetry()
-        if not (told.in_control and told.mode_known):
-            return
         try:
             for _ in range(_LAST_ZEROS):
-                link.send_velocity(Setpoint(stamp_ns=0))
+                if link is None or not link.stop_at_once():
+                    return
         except VehicleError as error:
             self._node.say('vehicle', str(error))
 

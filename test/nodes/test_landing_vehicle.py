@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from std_srvs.srv import Trigger
 
@@ -91,6 +93,33 @@ def test_after_the_hand_over_the_autopilot_lands_and_disarms(
     assert hovering.truth().altitude_agl_m == 0.0
     assert hovering.flight.physics.touchdown_speed_m_s < 1.0
     assert values_of(statuses[-1])['state'] == 'HANDOVER'
+
+
+@pytest.mark.parametrize('autopilot', ['ardupilot', 'px4'])
+def test_a_landing_node_that_is_shut_down_lets_the_autopilot_hold(
+    bench, hovering, engaging
+) -> None:
+    see, engage, _ = engaging()
+    client = bench.peer.create_client(ChangeState, '/landing/change_state')
+    bench.until(client.service_is_ready)
+    bench.until(lambda: engage().success, see)
+    assert hovering.mode_name in {'GUIDED', 'OFFBOARD'}
+    future = client.call_async(ChangeState.Request(transition=Transition(label='shutdown')))
+    bench.until(future.done, see)
+    bench.until(lambda: hovering.mode_name in {'BRAKE', 'AUTO.LOITER'}, see, within_s=5.0)
+
+
+def test_a_landing_that_ends_before_its_first_step_lets_the_autopilot_hold(
+    bench, hovering, engaging
+) -> None:
+    see, *_ = engaging()
+    (node,) = bench._nodes
+    bench.until(lambda: not node.check_engagement(), see)
+    assert hovering.mode_name == 'GUIDED'
+    with node._lock:
+        assert node.begin() == ''
+        node.end_landing()
+    bench.until(lambda: hovering.mode_name == 'BRAKE', see, within_s=8.0)
 
 
 def test_after_the_hand_over_it_holds_where_nothing_else_was_asked_for(
