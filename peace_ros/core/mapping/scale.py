@@ -36,6 +36,8 @@ _RETURN_PX = 0.5
 """A corner that is followed there and back must come back to where it was."""
 _LARGEST_TURN_RAD = radians(3.0)
 """Attitudes leave no turn between the pictures: more shows that one of them is wrong."""
+_FARTHEST = 2.0
+"""Corners farther away over ground, in heights, say little of the height: they are left out."""
 _LEAST_SPREAD = 0.08
 """Standard deviation of the corners, in heights: a narrow cluster gives no scale."""
 
@@ -69,11 +71,11 @@ def height_change(before: View, after: View, camera: Camera) -> HeightChange | M
     if corners is None or len(corners) < _FEWEST:
         return Mismatch.TEXTURE
     seen_from = [_one_above(view, camera) for view in (before, after)]
-    begin = _on_ground(corners, *seen_from[0])
-    guess = None if begin is None else _in_picture(begin, *seen_from[1])
-    if guess is None:
+    guess = _in_picture(_on_ground(corners, *seen_from[0]), *seen_from[1])
+    known = np.isfinite(guess).all(axis=1)
+    if known.sum() < _FEWEST:
         return Mismatch.HORIZON
-    seen = _followed(before.grey, after.grey, corners, guess.reshape(-1, 1, 2))
+    seen = _followed(before.grey, after.grey, corners[known], guess[known].reshape(-1, 1, 2))
     if len(seen[0]) < _FEWEST:
         return Mismatch.DIFFERENT
     there, here = (_on_ground(points, *by) for points, by in zip(seen, seen_from, strict=True))
@@ -87,23 +89,21 @@ def _one_above(view: View, camera: Camera) -> tuple[Camera, Pose]:
     return camera.resized(width, height), pose
 
 
-def _on_ground(points: Points, camera: Camera, pose: Pose) -> Points | None:
-    """Return pixels (u, v) as ground (north, east); None when one is above the horizon."""
+def _on_ground(points: Points, camera: Camera, pose: Pose) -> Points:
+    """Return pixels (u, v) as ground (north, east); NaN above the horizon or too far away."""
     directions = rays(camera, *points.reshape(-1, 2).T)
-    ground = np.linalg.inv(ground_to_camera(camera, pose)) @ directions
-    # A comparison with NaN is false, so pixels without a direction are refused too.
-    if not (ground[2] > 0.0).all():
-        return None
-    return np.ascontiguousarray((ground[:2] / ground[2]).T, np.float32)
+    north, east, height = np.linalg.inv(ground_to_camera(camera, pose)) @ directions
+    # A comparison with NaN is false, so pixels without a direction are left out too.
+    near = np.hypot(north, east) <= _FARTHEST * height
+    height[~near] = np.nan
+    return np.ascontiguousarray(np.stack((north / height, east / height), axis=1), np.float32)
 
 
-def _in_picture(ground: Points, camera: Camera, pose: Pose) -> Points | None:
-    """Return ground (north, east) as pixels (u, v); None when one is not in front of the camera."""
+def _in_picture(ground: Points, camera: Camera, pose: Pose) -> Points:
+    """Return ground (north, east) as pixels (u, v); NaN what is not in front of the camera."""
     directions = ground_to_camera(camera, pose) @ np.vstack((ground.T, np.ones(len(ground))))
-    if not (directions[2] > 0.0).all():
-        return None
-    seen = pixels(camera, directions)
-    return np.ascontiguousarray(seen.T, np.float32) if np.isfinite(seen).all() else None
+    directions[:, ~(directions[2] > 0.0)] = np.nan
+    return np.ascontiguousarray(pixels(camera, directions).T, np.float32)
 
 
 def _followed(
@@ -125,10 +125,12 @@ def _followed(
     return corners.reshape(-1, 2)[kept], found.reshape(-1, 2)[kept]
 
 
-def _fitted(there: Points | None, here: Points | None, off: float) -> HeightChange | Mismatch:
+def _fitted(there: Points, here: Points, off: float) -> HeightChange | Mismatch:
     """Return the change that most points agree with, within a distance in heights."""
-    if there is None or here is None:
+    known = np.isfinite(there).all(axis=1) & np.isfinite(here).all(axis=1)
+    if known.sum() < _FEWEST:
         return Mismatch.HORIZON
+    there, here = there[known], here[known]
     fit, agrees = cv2.estimateAffinePartial2D(
         there, here, method=cv2.RANSAC, ransacReprojThreshold=off
     )

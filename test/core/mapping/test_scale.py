@@ -11,6 +11,7 @@ import pytest
 
 from peace_ros.core.domain import Camera, Distortion
 from peace_ros.core.mapping import HeightChange, Mismatch, View, height_change, small_grey
+from peace_ros.core.optics import rays
 from peace_ros.simulation import NadirCamera, draw_world
 
 CAMERA = Camera.from_degrees(320, 240, 73.0)
@@ -90,10 +91,13 @@ def test_an_attitude_that_does_not_fit_says_nothing(view_from):
     assert height_change(before, wrong, CAMERA) is Mismatch.DIFFERENT
 
 
-def test_a_camera_at_the_horizon_says_nothing(view_from):
+@pytest.mark.parametrize(
+    ('pitch_deg', 'why'), [(70.0, Mismatch.DIFFERENT), (140.0, Mismatch.HORIZON)]
+)
+def test_a_camera_at_the_horizon_says_nothing(view_from, pitch_deg, why):
     before = view_from(30.0)
-    after = replace(view_from(28.0), pose=view_from(30.0, pitch=70.0).pose)
-    assert height_change(before, after, CAMERA) is Mismatch.HORIZON
+    after = replace(view_from(28.0), pose=view_from(30.0, pitch=pitch_deg).pose)
+    assert height_change(before, after, CAMERA) is why
 
 
 @pytest.mark.parametrize(
@@ -110,3 +114,34 @@ def test_pictures_of_another_size_say_nothing(view_from):
     before = view_from(30.0)
     smaller = replace(before, grey=before.grey[:-2])
     assert height_change(before, smaller, CAMERA) is Mismatch.DIFFERENT
+
+
+@pytest.mark.parametrize('ratio', [0.9, 1.1])
+def test_a_horizon_in_the_picture_does_not_hide_the_ground(view_from, ratio):
+    before, after = view_from(30.0, pitch=62.0), view_from(30.0 * ratio, 1.0, pitch=62.0)
+    found = height_change(before, after, CAMERA)
+    assert isinstance(found, HeightChange)
+    assert found.ratio == pytest.approx(ratio, rel=0.02)
+
+
+def test_a_lens_that_sees_sideways_still_measures_the_ground(pose_at):
+    """Corners at the edge of a fisheye's picture have no direction that counts."""
+    lens = Distortion('equidistant', (0.0,) * 4)
+    fisheye = replace(CAMERA, focal_xy_px=(100.0, 100.0), distortion=lens)
+    world = np.random.default_rng(3).integers(0, 256, (512, 512), np.uint8)
+    world = cv2.GaussianBlur(np.kron(world, np.ones((2, 2), np.uint8)), (5, 5), 0)
+
+    def view(altitude_m):
+        u, v = (each.ravel() for each in np.meshgrid(np.arange(320), np.arange(240)))
+        x, y, _ = np.nan_to_num(rays(fisheye, u, v))
+        east, south = (512.0 + 8.0 * altitude_m * each.reshape(240, 320) for each in (x, y))
+        maps = (east.astype(np.float32), south.astype(np.float32))
+        grey = cv2.remap(world, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+        beside = np.isnan(rays(fisheye, u, v)[0]).reshape(240, 320)
+        assert beside.any()
+        grey[beside] = world[:240, :320][beside]  # the frame of the vehicle
+        return View(grey, pose_at(altitude_m))
+
+    found = height_change(view(30.0), view(27.0), fisheye)
+    assert isinstance(found, HeightChange)
+    assert found.ratio == pytest.approx(0.9, rel=0.02)
