@@ -63,6 +63,7 @@ GROUPS = {
             'core/vehicle/test_sender_limits.py',
             'core/vehicle/test_obedience.py',
             'core/vehicle/test_obedience_limits.py',
+            'core/vehicle/test_faulty_axes_steps.py',
         ],
     ),
 }

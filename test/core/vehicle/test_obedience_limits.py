@@ -137,6 +137,51 @@ def test_a_bias_explains_a_slow_descent_but_no_altitude_that_froze() -> None:
     assert 'sink 1.4 m in 3.5 s' in found[1]
 
 
+@pytest.mark.parametrize(('step_m', 'believed'), [(0.01, True), (0.0099, False)])
+def test_an_altitude_froze_that_changes_by_less_than_a_centimetre(
+    step_m: float, believed: bool
+) -> None:
+    found = noticed(
+        steady(down=0.3125),  # 1.1 m in 3.5 s, which a bias explains
+        lambda at_s: (0.0, 0.0, step_m * (round(at_s / STEP_S) % 2)),
+        velocity=moving(),
+    )
+    assert (found is None) == believed
+
+
+def test_an_altitude_is_frozen_from_the_begin_of_what_is_compared() -> None:
+    found = noticed(
+        steady(down=0.3125), lambda at_s: (0.0, 0.0, 0.02 if at_s > 0.5 else 0.0), velocity=moving()
+    )
+    assert found is not None
+    assert found[0] == 0.5 + STEP_S + 3.5
+
+
+@pytest.mark.parametrize(('speed', 'believed'), [(2.31, False), (2.3, True)])
+def test_a_bias_explains_less_than_a_third_of_a_metre_per_second(
+    speed: float, believed: bool
+) -> None:
+    """Told to sink 0.33 m/s * 3.5 s within half a second, it sinks and comes up again."""
+    watch = ObedienceWatch()
+    for step in range(9):
+        at_s = 0.5 * step
+        sunk_m = 0.5 if 1.5 <= at_s <= 3.5 else 0.0
+        watch.take(ReportedMotion((0.0, 0.0, sunk_m), (0.0, 0.0)), round(at_s * 1e9))
+        watch.tell((0.0, 0.0, speed if at_s == 1.0 else 0.0), round(at_s * 1e9))
+        assert at_s == 4.0 or not watch.problem
+    assert (watch.problem == '') == believed
+    assert believed or 'sink 1.2 m in 3.5 s and reports 0.0 m' in watch.problem
+
+
+@pytest.mark.parametrize('days', [0, 100])
+def test_what_is_told_between_two_reports_counts_from_then_on(days: int) -> None:
+    watch, begin_ns = ObedienceWatch(), days * 86_400 * 1_000_000_000
+    watch.take(STANDING, begin_ns)
+    watch.tell((0.0, 0.0, 2.0), begin_ns + 300_000_000)
+    watch.take(STANDING, begin_ns + 400_000_000)
+    assert watch._marks[-1].told_m - watch._marks[0].told_m == pytest.approx(0.2, abs=1e-6)
+
+
 def test_a_vehicle_that_climbed_has_a_second_more() -> None:
     found = noticed(
         lambda at_s: (0.0, 0.0, -2.0 if at_s < 5.0 else 2.0),
