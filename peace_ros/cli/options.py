@@ -8,6 +8,7 @@ import functools
 import inspect
 from collections.abc import Callable
 from dataclasses import fields
+from operator import getitem
 from types import UnionType
 from typing import Annotated, Any, Optional, get_args, get_origin, get_type_hints
 
@@ -68,7 +69,7 @@ def _with_optional(hint: Any) -> Any:
     """Return ``Optional[X]`` for ``X | None``, also inside Annotated."""
     if get_origin(hint) is Annotated:
         kind, *rest = get_args(hint)
-        return Annotated.__class_getitem__((_with_optional(kind), *rest))
+        return getitem(Annotated, (_with_optional(kind), *rest))
     if get_origin(hint) is UnionType:
         (kind,) = (each for each in get_args(hint) if each is not type(None))
         return Optional[kind]  # noqa: UP045 - made for who reads only this
