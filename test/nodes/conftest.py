@@ -14,16 +14,17 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseStamped
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, Image
 
-from peace_ros.core.domain import Camera, Heatmap
+from peace_ros.core.domain import Camera, Heatmap, Pose
 from peace_ros.core.vehicle import VehicleParameters, open_vehicle
 from peace_ros.nodes import qos
 from peace_ros.nodes.inputs import FRAME_INFO
-from peace_ros.nodes.messages import camera_info, heatmap_to_image, image_message
+from peace_ros.nodes.messages import camera_info, heatmap_to_image, image_message, pose_to_message
 from peace_ros.nodes.node import PeaceNode
 from peace_ros.simulation.demo.pilot import Pilot
 
@@ -118,6 +119,23 @@ class Bench:
             self.offer(Image, f'{namespace}/heatmap'.lstrip('/'), qos.IMAGE_OUT),
             self.offer(CameraInfo, f'{namespace}/{FRAME_INFO}'.lstrip('/'), qos.RESULT),
         )
+
+    def offer_safe_ground(
+        self, node: PeaceNode, altitude_m: float, north_m: float = 0.0, east_m: float = 0.0
+    ) -> Callable[[], None]:
+        """Return what publishes a level pose and a heatmap that is safe everywhere, as of now."""
+        heatmaps = self.offer_heatmaps()
+        poses = self.offer(PoseStamped, 'pose', qos.POSE)
+        safety = np.full((32, 32), 0.97, np.float32)
+
+        def see() -> None:
+            at_ns = node.clock_ns()
+            level = (1.0, 0.0, 0.0, 0.0)
+            pose = Pose(at_ns, north_m, east_m, -altitude_m, level, altitude_m)
+            poses.publish(pose_to_message(pose))
+            heatmaps.publish(safety, at_ns)
+
+        return see
 
     def until(
         self,

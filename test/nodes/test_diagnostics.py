@@ -9,13 +9,10 @@ from functools import partial
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import Image
 
-from peace_ros.core.domain import Pose
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
-from peace_ros.nodes.messages import pose_to_message
 from peace_ros.nodes.prompt_generator import PromptGeneratorNode
 
 
@@ -48,15 +45,7 @@ def ready(bench):
     """Return a landing node that could begin, what it reports, and what keeps it so."""
     found = bench.findings('landing')
     node = bench.run(LandingNode, interface='twist')
-    heatmaps = bench.offer_heatmaps()
-    poses = bench.offer(PoseStamped, 'pose', qos.POSE)
-    safety = np.full((32, 32), 0.97, np.float32)
-
-    def see() -> None:
-        at_ns = node.clock_ns()
-        poses.publish(pose_to_message(Pose(at_ns, 0.0, 0.0, -40.0, (1.0, 0.0, 0.0, 0.0), 40.0)))
-        heatmaps.publish(safety, at_ns)
-
+    see = bench.offer_safe_ground(node, 40.0)
     bench.until(lambda: not node.check_engagement(), see)
     return node, found, see
 

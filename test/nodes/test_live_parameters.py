@@ -7,15 +7,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image
 
-from peace_ros.core.domain import Pose
 from peace_ros.core.messages import heatmap_from_image, prompt_from_message
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
-from peace_ros.nodes.messages import pose_to_message
 from peace_ros.nodes.prompt_generator import PromptGeneratorNode
 from peace_ros.nodes.segmentation import SegmentationNode
 
@@ -82,15 +79,7 @@ def test_terms_and_template_of_the_heatmaps_change(bench, picture, clipseg_folde
 @pytest.fixture
 def landing(bench):
     node = bench.run(LandingNode, interface='twist')
-    heatmaps = bench.offer_heatmaps()
-    poses = bench.offer(PoseStamped, 'pose', qos.POSE)
-    safety = np.full((32, 32), 0.97, np.float32)
-
-    def see() -> None:
-        at_ns = node.clock_ns()
-        poses.publish(pose_to_message(Pose(at_ns, 0.0, 0.0, -60.0, (1.0, 0.0, 0.0, 0.0), 60.0)))
-        heatmaps.publish(safety, at_ns)
-
+    see = bench.offer_safe_ground(node, 60.0)
     return node, see
 
 

@@ -13,11 +13,9 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid, Path
 from visualization_msgs.msg import Marker, MarkerArray
 
-from peace_ros.core.domain import Pose
 from peace_ros.core.mapping import MapLayers
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
-from peace_ros.nodes.messages import pose_to_message
 from peace_ros.nodes.view import grid_message, markers_message
 
 ROOT = FilePath(__file__).resolve().parents[2]
@@ -55,15 +53,7 @@ def test_a_landing_shows_map_places_pose_and_path(bench):
         )
     }
     node = bench.run(LandingNode, interface='twist')
-    heatmaps = bench.offer_heatmaps()
-    poses = bench.offer(PoseStamped, 'pose', qos.POSE)
-    safety = np.full((32, 32), 0.97, np.float32)
-
-    def see() -> None:
-        at_ns = node.clock_ns()
-        poses.publish(pose_to_message(Pose(at_ns, 5.0, 2.0, -40.0, (1.0, 0.0, 0.0, 0.0), 40.0)))
-        heatmaps.publish(safety, at_ns)
-
+    see = bench.offer_safe_ground(node, 40.0, north_m=5.0, east_m=2.0)
     bench.until(lambda: all(heard.values()), see)
     at = heard[PoseStamped][-1].pose.position
     assert (at.x, at.y, at.z) == pytest.approx((2.0, 5.0, 40.0))

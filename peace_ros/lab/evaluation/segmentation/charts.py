@@ -6,35 +6,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from io import StringIO
-from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from peace_ros.lab.chart_style import CHART_STYLE
 from peace_ros.lab.evaluation.segmentation.figures import Figures
 
 COLOURS = ('#0b62a8', '#c2410c', '#15803d', '#7e22ce', '#a16207', '#0e7490')
 """Of configurations, in their order."""
-_STYLE: dict[Any, Any] = {
-    'svg.fonttype': 'none',
-    'svg.hashsalt': 'peace_ros',
-    'font.family': 'sans-serif',
-    'font.sans-serif': ['system-ui', 'DejaVu Sans'],
-    'axes.titleweight': 'bold',
-    'axes.titlelocation': 'left',
-    'axes.grid': True,
-    'axes.spines.top': False,
-    'axes.spines.right': False,
-    'axes.edgecolor': '#8c959f',
-    'grid.color': '#e4e7eb',
-}
 
 
 def charts(named: dict[str, Figures]) -> list[str]:
     """Return three ``svg`` elements: precision over recall, rates over threshold, reliability."""
-    with rc_context(_STYLE):
+    with rc_context(CHART_STYLE):
         trade, trade_axes = _axes('Precision over recall of safe ground', 'recall', 'precision')
         over, over_axes = _axes('Recall (line) and false-safe (dashed)', 'threshold', 'rate')
         trust, trust_axes = _axes('Reliability of the heatmap', 'score', 'safe share')

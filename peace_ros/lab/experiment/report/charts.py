@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
-from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
@@ -15,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from peace_ros.core.domain import RecordingError
+from peace_ros.lab.chart_style import CHART_STYLE
 from peace_ros.lab.experiment.report.paper import PAPER
 from peace_ros.lab.experiment.store import Row
 
@@ -27,27 +27,13 @@ COLOURS = {
     'failed': '#0e7490',
 }
 """Of results."""
-_STYLE: dict[Any, Any] = {
-    'svg.fonttype': 'none',
-    'svg.hashsalt': 'peace_ros',
-    'font.family': 'sans-serif',
-    'font.sans-serif': ['system-ui', 'DejaVu Sans'],
-    'axes.titleweight': 'bold',
-    'axes.titlelocation': 'left',
-    'axes.grid': True,
-    'axes.axisbelow': True,
-    'axes.spines.top': False,
-    'axes.spines.right': False,
-    'axes.edgecolor': '#8c959f',
-    'grid.color': '#e4e7eb',
-}
 Groups = dict[str, list[Row]]
 """Name of configuration and policy -> its flights."""
 
 
 def draw_charts(groups: Groups) -> dict[str, Figure]:
     """Return name -> chart: results, time, distance, time of each run, paths."""
-    with rc_context(_STYLE):
+    with rc_context(CHART_STYLE):
         return {
             'results': _results(groups),
             'time': _boxes(groups, 'time_s', 'Time of a run', 's'),
@@ -63,7 +49,7 @@ def draw_charts(groups: Groups) -> dict[str, Figure]:
 def as_svg(figure: Figure) -> str:
     """Return the `svg` element of a chart."""
     out = StringIO()
-    with rc_context(_STYLE):
+    with rc_context(CHART_STYLE):
         figure.savefig(out, format='svg', metadata={'Date': None, 'Creator': None})
     return out.getvalue()[out.getvalue().index('<svg') :]
 
