@@ -25,6 +25,8 @@ class Doubt(Enum):
     DIFFERENT = 'too few corners of the ground are found again'
     TURN = 'the pictures turn otherwise than the body rates'
     ERROR = 'the corners do not move like level ground'
+    MOVABLE = 'too little of the ground in view is sure to keep still'
+    MOVING = 'the velocity over ground does not change as the vehicle is accelerated'
     BEGINNING = 'too few pictures for a velocity'
     UNCERTAIN = 'the velocity is too uncertain'
 

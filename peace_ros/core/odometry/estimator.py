@@ -10,13 +10,14 @@ vision makes its attitude from it, and an error would feed itself.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 from math import hypot, isfinite, radians
 
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import NADIR, Camera, Frame, Mount, Pose
+from peace_ros.core.domain import NADIR, Camera, Frame, Heatmap, Mount, Pose
 from peace_ros.core.domain.camera import Quaternion
 from peace_ros.core.domain.geometry import (
     GRAVITY_M_S2,
@@ -26,6 +27,7 @@ from peace_ros.core.domain.geometry import (
     rotation_matrix,
 )
 from peace_ros.core.mapping import small_grey
+from peace_ros.core.odometry.coherence import AccelerationCheck
 from peace_ros.core.odometry.estimate import Doubt, MotionEstimate
 from peace_ros.core.odometry.inertial import InertialHistory, InertialMotion, InertialSample
 from peace_ros.core.odometry.keyframe import (
@@ -35,9 +37,17 @@ from peace_ros.core.odometry.keyframe import (
     build_keyframe,
     find,
 )
+from peace_ros.core.odometry.movable import ScoredView
 from peace_ros.core.odometry.parameters import OdometryParameters
-from peace_ros.core.odometry.plane import Array, PriorErrors, RelativePose, Solution, solve
-from peace_ros.core.odometry.velocity import Track
+from peace_ros.core.odometry.plane import (
+    LEAST_ERROR_PX,
+    Array,
+    PriorErrors,
+    RelativePose,
+    Solution,
+    solve,
+)
+from peace_ros.core.odometry.velocity import Track, Velocity
 
 VIEW_PX = 352
 """Longer edge of the pictures that are compared."""
@@ -53,7 +63,7 @@ _NEW_KEY_AGREEING = 0.4
 """Part of the corners of the key frame below which the next one begins."""
 _NEW_KEY_RATIO = 1.33
 """Change of the height after which the next key frame begins."""
-_NEW_KEY_ERROR_PX = 0.2
+_NEW_KEY_ERROR_PX = 0.15
 """Error of the corners above which the next key frame begins: hills then show, and their error
 grows with the way from the key frame."""
 _LARGEST_TURN = 4.0
@@ -70,6 +80,8 @@ _LOST_M_S2 = 1.0
 _LEAST_SHIFT = 0.1
 """Heights: by errors of corners against a nearer key frame the relief is not estimated."""
 _LOWEST_M = 1.0
+_KEPT = 40
+"""Frames for which a heatmap may still come."""
 _LEAST_RATIO = 0.1
 _VELOCITY_GAIN = 0.3
 """Of the prediction: part of what the position was off that is laid to the velocity."""
@@ -98,11 +110,16 @@ class _VehicleState:
         """Since it was solved last."""
         return (self.stamp_ns - self.solved_ns) * 1e-9
 
+    def change_m_s(self, stamp_ns: int, motion: InertialMotion) -> Array:
+        """Return the change of the velocity (3,) up to a stamp: north, east, down."""
+        change: Array = rotation_matrix(self.quaternion) @ motion.velocity_m_s
+        change[2] += GRAVITY_M_S2 * (stamp_ns - self.stamp_ns) * 1e-9
+        return change
+
     def after(self, stamp_ns: int, motion: InertialMotion) -> _VehicleState:
         """Return the state that body rates and accelerations predict."""
         span_s = (stamp_ns - self.stamp_ns) * 1e-9
-        change = rotation_matrix(self.quaternion) @ motion.velocity_m_s
-        change[2] += GRAVITY_M_S2 * span_s
+        change = self.change_m_s(stamp_ns, motion)
         return _VehicleState(
             stamp_ns,
             multiply(self.quaternion, motion.turn),
@@ -137,6 +154,13 @@ class _Key:
     covariance_m2: Array
     """3 x 3, of the position."""
 
+    def without(self, seen: ScoredView | None, limit: float) -> _Key:
+        """Return the key frame without the corners that a heatmap calls clearly unsafe."""
+        if seen is None:
+            return self
+        ground_m = self.position_m + self.height_m * self.frame.ground
+        return replace(self, frame=self.frame.only(~seen.is_below(ground_m, limit)))
+
 
 class VisualInertialOdometry:
     """Estimates how a vehicle moves, frame by frame; pure.
@@ -161,6 +185,11 @@ class VisualInertialOdometry:
         self._state: _VehicleState | None = None
         self._key: _Key | None = None
         self._last: NDArray[np.uint8] | None = None
+        self._check = AccelerationCheck(self._p.acceleration_limit_m_s)
+        self._strayed_m = 0.0
+        """Way that the pictures and the accelerations differed by in the present doubt."""
+        self._solved: deque[tuple[_VehicleState, Camera, Array]] = deque(maxlen=_KEPT)
+        self._seen: ScoredView | None = None
         self.resets = 0
         """How often the position was given from outside, or continued by a guess."""
 
@@ -182,7 +211,31 @@ class VisualInertialOdometry:
         )
         self._key = None
         self._track.clear()
+        self._check.begin(pose.stamp_ns, self._state.velocity_m_s)
+        self._solved.clear()
+        self._seen = None
+        self._strayed_m = 0.0
         self.resets += 1
+
+    def add_heatmap(self, heatmap: Heatmap) -> bool:
+        """Leave out the corners that a heatmap calls clearly unsafe, until the next one.
+
+        :return: False when it belongs to no frame of the last seconds whose place is known.
+        """
+        for state, camera, mount in self._solved:
+            if state.stamp_ns == heatmap.stamp_ns:
+                height, width = heatmap.safety.shape
+                self._seen = ScoredView(
+                    heatmap.safety,
+                    camera.resized(width, height),
+                    mount,
+                    state.quaternion,
+                    state.position_m,
+                )
+                if self._key is not None:
+                    self._key = self._key.without(self._seen, self._p.movable_below)
+                return True
+        return False
 
     def add_inertial(self, sample: InertialSample) -> bool:
         """Keep body rates; False when they are not newer than the last ones, or impossible."""
@@ -202,19 +255,19 @@ class VisualInertialOdometry:
         if isinstance(moved, Doubt):
             return moved
         state, rates_rad_s = moved
-        view = self._viewed(frame, state, altitude_agl_m, rates_rad_s)
-        if isinstance(view, Doubt):
-            return view
+        picture = self._viewed(frame, state, altitude_agl_m, rates_rad_s)
+        if isinstance(picture, Doubt):
+            return picture
         if self._key is None:
-            return self._begin_key(view, state) or Doubt.BEGINNING
-        if view.camera != self._key.camera:
-            return self._begin_again(view, state) or Doubt.BEGINNING
-        found = self._against(self._key, view, state)
+            return self._begin_key(picture, state) or Doubt.BEGINNING
+        if picture.camera != self._key.camera:
+            return self._begin_again(picture, state) or Doubt.BEGINNING
+        found = self._against(self._key, picture, state)
         if isinstance(found, Doubt):
             if state.lost_s > _LOST_S:
-                self._begin_again(view, state)
+                self._begin_again(picture, state)
             return found
-        return self._take(self._key, view, state, *found)
+        return self._take(self._key, picture, state, *found)
 
     def _moved_to(self, stamp_ns: int) -> tuple[_VehicleState, Array] | Doubt:
         """Return what body rates and accelerations predict, and the rates at the stamp."""
@@ -225,6 +278,7 @@ class VisualInertialOdometry:
         motion = self._inertial.between(self._state.stamp_ns, stamp_ns)
         if motion is None:
             return Doubt.RATES
+        self._check.accelerate(stamp_ns, self._state.change_m_s(stamp_ns, motion))
         self._state = self._state.after(stamp_ns, motion)
         return self._state, motion.rates_rad_s
 
@@ -250,54 +304,76 @@ class VisualInertialOdometry:
         return np.asarray(rotation_matrix(quaternion) @ np.array(self._mount.offset_frd_m))
 
     def _begin_key(
-        self, view: _Picture, state: _VehicleState, fewest: int = _FEWEST
+        self, picture: _Picture, state: _VehicleState, fewest: int = _FEWEST
     ) -> Doubt | None:
         """Make a picture the key frame; if it has too few corners the old one stays."""
-        frame = build_keyframe(view.grey, view.camera, state.quaternion, view.mount, view.readout)
-        if len(frame.ground) < max(_FEWEST, fewest):
-            return Doubt.TEXTURE
-        self._key = _Key(frame, view.camera, state.position_m, view.height_m, state.covariance_m2)
+        frame = build_keyframe(
+            picture.grey, picture.camera, state.quaternion, picture.mount, picture.readout
+        )
+        key = _Key(frame, picture.camera, state.position_m, picture.height_m, state.covariance_m2)
+        still = key.without(self._seen, self._p.movable_below)
+        if len(still.frame.ground) < max(_FEWEST, fewest):
+            return Doubt.TEXTURE if len(frame.ground) < _FEWEST else Doubt.MOVABLE
+        self._key = still
+        self._solved.append((state, picture.camera, picture.mount))
         self._state = replace(state, solved_ns=state.stamp_ns)
         return None
 
-    def _begin_again(self, view: _Picture, state: _VehicleState) -> Doubt | None:
+    def _begin_again(self, picture: _Picture, state: _VehicleState) -> Doubt | None:
         """Continue with a new key frame where the vehicle is believed to be."""
         grown = np.eye(3) * (0.5 * _LOST_M_S2 * state.lost_s**2) ** 2
-        problem = self._begin_key(view, replace(state, covariance_m2=state.covariance_m2 + grown))
+        problem = self._begin_key(
+            picture, replace(state, covariance_m2=state.covariance_m2 + grown)
+        )
         if problem is None:
             self._track.clear()
             self.resets += 1
         return problem
 
+    def _is_moving(self, velocity: Velocity, state: _VehicleState, span_s: float) -> bool:
+        """Compare a velocity with the accelerations; after a doubt the position is a guess."""
+        doubted = self._check.doubts
+        if self._check.compare(velocity.stamp_ns, velocity.mean_m_s):
+            self._strayed_m += self._check.off_m_s * span_s
+        elif doubted and self._key is not None:
+            strayed = np.eye(3) * self._strayed_m**2
+            self._key = replace(self._key, covariance_m2=self._key.covariance_m2 + strayed)
+            self._state = replace(state, covariance_m2=state.covariance_m2 + strayed)
+            self._strayed_m = 0.0
+            self.resets += 1
+        return self._check.doubts
+
     def _against(
-        self, key: _Key, view: _Picture, state: _VehicleState
+        self, key: _Key, picture: _Picture, state: _VehicleState
     ) -> tuple[Solution, Matches] | Doubt:
         """Return where the camera is against a key frame."""
+        if len(key.frame.ground) < _FEWEST:
+            return Doubt.MOVABLE
         moved = (state.position_m - key.position_m) / key.height_m
         predicted = near = RelativePose(
             state.quaternion, moved[:2], max(_LEAST_RATIO, 1.0 - moved[2])
         )
         turn_deg = self._p.turn_error_deg + self._p.turn_drift_deg_s * state.lost_s
         errors = PriorErrors(radians(turn_deg), self._p.height_error)
-        readout = replace(view.readout, velocity=state.velocity_m_s / key.height_m)
+        readout = replace(picture.readout, velocity=state.velocity_m_s / key.height_m)
         levels = _LEVELS_WHEN_NEAR if state.lost_s < _NEAR_S else _LEVELS
         for _ in range(2):
-            matches = find(key.frame, view.grey, view.camera, near, view.mount, levels)
+            matches = find(key.frame, picture.grey, picture.camera, near, picture.mount, levels)
             if len(matches.which) < max(_FEWEST, _LEAST_AGREEING * matches.expected):
                 return Doubt.DIFFERENT
-            directions, shifted = readout.at_once(view.camera, matches.directions)
+            directions, shifted = readout.at_once(picture.camera, matches.directions)
             solution = solve(
                 key.frame.ground[matches.which] - shifted,
                 (directions[:2] / directions[2]).T,
                 predicted,
                 errors,
-                view.mount,
-                view.camera.focal_px,
-                view.height_m / key.height_m,
+                picture.mount,
+                picture.camera.focal_px,
+                picture.height_m / key.height_m,
             )
             off = np.linalg.norm(solution.place.position - near.position)
             near = solution.place
-            if off * view.camera.focal_px < _AGAIN_PX:
+            if off * picture.camera.focal_px < _AGAIN_PX:
                 break
         if np.linalg.norm(solution.turned_rad) > _LARGEST_TURN * errors.turn_rad:
             return Doubt.TURN
@@ -306,7 +382,7 @@ class VisualInertialOdometry:
     def _take(
         self,
         key: _Key,
-        view: _Picture,
+        picture: _Picture,
         predicted: _VehicleState,
         solution: Solution,
         matches: Matches,
@@ -327,19 +403,24 @@ class VisualInertialOdometry:
             key.covariance_m2 + error + shared,
             predicted.stamp_ns,
         )
+        self._solved.append((state, picture.camera, picture.mount))
         offset = self._offset_m(state.quaternion)
-        self._track.add(state.stamp_ns, position - offset, np.diag(error))
+        # Corners share the error that hills give them: the more they scatter, the fewer count.
+        rough = (solution.error_px / LEAST_ERROR_PX) ** 2
+        self._track.add(state.stamp_ns, position - offset, rough * np.diag(error))
         if (
             agreeing < max(_FEW, _NEW_KEY_AGREEING * len(key.frame.ground))
             or solution.error_px > _NEW_KEY_ERROR_PX
             or not 1.0 / _NEW_KEY_RATIO < place.ratio < _NEW_KEY_RATIO
         ):
-            self._begin_key(view, state, agreeing)
+            self._begin_key(picture, state, agreeing)
         velocity = self._track.velocity()
         if velocity is None:
             return Doubt.BEGINNING
+        if self._is_moving(velocity, state, predicted.lost_s):
+            return Doubt.MOVING
         shift = max(_LEAST_SHIFT, float(np.hypot(*place.shift)))
-        relief = solution.error_px / (view.camera.focal_px * shift)
+        relief = solution.error_px / (picture.camera.focal_px * shift)
         scale_error = hypot(_ALTITUDE_ERROR, self._p.ground_error_m / height_m, relief)
         velocity_covariance = np.diag(velocity.variance_m2_s2) + scale_error**2 * np.outer(
             velocity.mean_m_s, velocity.mean_m_s

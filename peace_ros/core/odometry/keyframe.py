@@ -64,6 +64,10 @@ class Keyframe:
     ground_from_pixel: Array
     """3 x 3: (u, v, 1) to (north, east, 1) times a factor."""
 
+    def only(self, which: NDArray[np.bool_]) -> Keyframe:
+        """Return the key frame with these of its corners."""
+        return replace(self, corners_px=self.corners_px[which], ground=self.ground[which])
+
 
 @dataclass(frozen=True)
 class Matches:
@@ -201,7 +205,7 @@ def _noise_variance(grey: Grey) -> float:
     """Estimate the variance of the noise of a picture (Immerkaer, 1996), by the median."""
     kernel = np.array([[1.0, -2.0, 1.0], [-2.0, 4.0, -2.0], [1.0, -2.0, 1.0]])
     curved = cv2.filter2D(grey[::2], cv2.CV_32F, kernel)
-    return (1.4826 * float(np.median(np.abs(curved))) / 6.0) ** 2
+    return (1.4826 * float(np.median(np.abs(curved[:, ::4]))) / 6.0) ** 2
 
 
 def _alike(warped: Grey, key: Grey, corners: NDArray[np.float32]) -> Grey:

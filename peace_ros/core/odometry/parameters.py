@@ -39,9 +39,23 @@ class OdometryParameters(ParameterSet):
         low=0.0,
         high=20.0,
     )
+    movable_below: float = parameter(
+        0.2,
+        'Corners where the heatmap is below this do not count: water, vehicles, people and trees '
+        'may move. Without heatmaps all corners count.',
+        low=0.0,
+        high=1.0,
+    )
+    acceleration_limit_m_s: float = parameter(
+        0.6,
+        'A velocity over ground that differs by more from the one that accelerations give is not '
+        'given: the ground moves.',
+        low=0.2,
+        high=10.0,
+    )
     velocity_window_s: float = parameter(
         0.4, 'Velocity is the slope of the position over this time.', low=0.2, high=2.0
     )
     velocity_error_limit_m_s: float = parameter(
-        0.25, 'With a larger standard deviation the velocity is not given.', low=0.05, high=5.0
+        0.3, 'With a larger standard deviation the velocity is not given.', low=0.05, high=5.0
     )

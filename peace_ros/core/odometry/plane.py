@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 _STEPS = 4
 _ROBUST = 2.0
 """Residuals beyond so many standard deviations count less (Huber, 1964)."""
-_LEAST_ERROR_PX = 0.1
+LEAST_ERROR_PX = 0.1
 """A corner is not found more precisely."""
 _MEDIAN = 1.1774
 """Of the length of two normal errors, in standard deviations (Rayleigh distribution)."""
@@ -118,7 +118,7 @@ def solve(
     for _ in range(_STEPS):
         off, slopes = _residuals(ground, seen, place, optical_from_body, focal_px)
         lengths = np.linalg.norm(off, axis=1)
-        error_px = max(_LEAST_ERROR_PX, _median(lengths) / _MEDIAN)
+        error_px = max(LEAST_ERROR_PX, _median(lengths) / _MEDIAN)
         weights = np.minimum(1.0, _ROBUST * error_px / np.maximum(lengths, 1e-9)) / error_px**2
         weighted = slopes * weights[:, None, None]
         information = prior + np.einsum('nij,nik->jk', weighted, slopes)

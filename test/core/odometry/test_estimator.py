@@ -8,7 +8,7 @@ from math import nan, radians
 import numpy as np
 import pytest
 
-from peace_ros.core.domain import Camera, Distortion, Frame
+from peace_ros.core.domain import Camera, Distortion, Frame, Heatmap
 from peace_ros.core.domain.geometry import angle_between, mount_from_degrees
 from peace_ros.core.odometry import (
     Doubt,
@@ -238,3 +238,94 @@ def test_a_sample_that_cannot_be_is_not_taken():
     odometry = VisualInertialOdometry(CAMERA)
     assert odometry.add_inertial(InertialSample(1, (0.0, 0.0, 0.0), (0.0, 0.0, -9.8)))
     assert not odometry.add_inertial(InertialSample(1, (0.0, 0.0, 0.0), (0.0, 0.0, -9.8)))
+
+
+class MovingGround:
+    """What a flight sees drifts to the east from a moment on."""
+
+    def __init__(self, flight, *, speed_m_s, from_s, until_s=99.0):
+        self.flight, self.speed_m_s, self.from_s, self.until_s = flight, speed_m_s, from_s, until_s
+        flight.seen = self.seen
+
+    def seen(self, time_s):
+        pose = self.flight.motion.pose(time_s)
+        moved_m = self.speed_m_s * max(0.0, min(time_s, self.until_s) - self.from_s)
+        return self.flight.eye.view(replace(pose, east_m=pose.east_m - moved_m)).image_rgb
+
+
+@pytest.mark.parametrize('speed_m_s', [1.0, 3.0])
+@pytest.mark.parametrize('from_s', [0.0, 2.0])
+def test_ground_that_moves_is_doubted(fly, speed_m_s, from_s):
+    flight = fly(HOVER)
+    MovingGround(flight, speed_m_s=speed_m_s, from_s=from_s)
+    results = flight.run(70)
+    known = [each for each in results if isinstance(each, MotionEstimate)]
+    assert max((flight.velocity_error(each) for each in known), default=0.0) < 0.9
+    late = results[round(from_s * 10) + 6 :]
+    assert set(late) <= {Doubt.MOVING, Doubt.UNCERTAIN}
+    assert late.count(Doubt.MOVING) > 0.9 * len(late)
+
+
+def test_when_the_ground_stands_still_again_the_position_is_a_guess(fly):
+    flight = fly(HOVER)
+    MovingGround(flight, speed_m_s=2.0, from_s=1.0, until_s=3.0)
+    found = flight.run(45)[-1]
+    assert flight.velocity_error(found) < 0.2
+    assert found.resets == 2
+    error_m = np.sqrt(found.position_covariance_m2[1, 1])
+    assert 2.0 < flight.position_error(found) < 2.0 * error_m
+
+
+def heatmap_of(flight, safety):
+    return Heatmap(safety, flight.motion.stamp_ns(flight.time_s))
+
+
+class MovingHalf:
+    """The western half of the picture shows water that drifts, whatever the vehicle does."""
+
+    def __init__(self, flight):
+        self.flight, self.still = flight, flight.seen
+        flight.seen = self.seen
+
+    def seen(self, time_s):
+        picture = self.still(time_s).copy()
+        pose = self.flight.motion.pose(time_s)
+        wave = replace(pose, north_m=pose.north_m - 1.5 * time_s, east_m=pose.east_m + 60.0)
+        picture[:, :190] = self.flight.eye.view(wave).image_rgb[:, :190]
+        return picture
+
+
+def test_corners_that_the_heatmap_calls_unsafe_do_not_count(fly):
+    safety = np.full((60, 80), 0.9, np.float32)
+    safety[:, :50] = 0.05
+    largest = []
+    for with_heatmap in (False, True):
+        flight = fly(Motion(40.0, speed_m_s=1.0))
+        MovingHalf(flight)
+        results = []
+        for _ in range(25):
+            results.append(flight.step())
+            if with_heatmap:
+                assert flight.odometry.add_heatmap(heatmap_of(flight, safety))
+        known = [each for each in results[6:] if isinstance(each, MotionEstimate)]
+        largest.append(max((flight.velocity_error(each) for each in known), default=9.0))
+        right = sum(flight.velocity_error(each) < 0.2 for each in known)
+    assert largest[0] > 0.4
+    assert largest[1] < 0.2
+    assert right == 19
+
+
+def test_where_all_ground_is_unsafe_nothing_is_said(fly):
+    flight = fly(HOVER)
+    flight.run(6)
+    assert flight.odometry.add_heatmap(heatmap_of(flight, np.zeros((60, 80), np.float32)))
+    assert set(flight.run(20)) == {Doubt.MOVABLE}
+    assert flight.odometry.add_heatmap(heatmap_of(flight, np.ones((60, 80), np.float32))) is False
+
+
+def test_a_heatmap_of_another_frame_is_not_used(fly):
+    flight = fly(HOVER)
+    flight.run(6)
+    other = Heatmap(np.zeros((60, 80), np.float32), flight.motion.stamp_ns(0.55))
+    assert not flight.odometry.add_heatmap(other)
+    assert isinstance(flight.step(), MotionEstimate)
