@@ -21,7 +21,7 @@ _PULL_RAD_S = 0.25
 4 s is not learned."""
 _LEARNED_M_S2 = 0.5
 """Largest horizontal error of the acceleration that is learned: 3 degrees of tilt."""
-_AGREES_AGAIN = 0.5
+_AGREES_AGAIN = 0.8
 """Of the limit, below which a doubt ends."""
 _DRIFT_M_S2 = 0.15
 """Error of the acceleration: after a time without pictures the limit is wider."""

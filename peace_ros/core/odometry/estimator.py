@@ -193,13 +193,19 @@ class VisualInertialOdometry:
         self.resets = 0
         """How often the position was given from outside, or continued by a guess."""
 
-    def align(self, pose: Pose, velocity_m_s: tuple[float, float, float]) -> None:
+    def align(self, pose: Pose, velocity_m_s: tuple[float, float, float]) -> bool:
         """Begin from a known pose and velocity; the next frame becomes a key frame.
 
         Args:
             pose: Of the vehicle, with position and attitude.
             velocity_m_s: North, east, down.
+
+        Returns:
+            False, and nothing has changed, when one of them is not known.
         """
+        known = pose.has_position and pose.has_height and pose.has_attitude
+        if not (known and all(map(isfinite, velocity_m_s))):
+            return False
         at = camera_pose(self._mount, pose)
         self._state = _VehicleState(
             pose.stamp_ns,
@@ -216,6 +222,7 @@ class VisualInertialOdometry:
         self._seen = None
         self._strayed_m = 0.0
         self.resets += 1
+        return True
 
     def add_heatmap(self, heatmap: Heatmap) -> bool:
         """Leave out the corners that a heatmap calls clearly unsafe, until the next one.

@@ -46,5 +46,6 @@ class ScoredView:
         height, width = self.safety.shape
         seen = front & (column >= 0) & (row >= 0) & (column < width) & (row < height)
         below = np.zeros(len(ground_m), np.bool_)
-        below[seen] = self.safety[row[seen], column[seen]] < limit
+        # A comparison with NaN is false: what is not known may move.
+        below[seen] = ~(self.safety[row[seen], column[seen]] >= limit)
         return below

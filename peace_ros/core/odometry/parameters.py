@@ -47,7 +47,7 @@ class OdometryParameters(ParameterSet):
         high=1.0,
     )
     acceleration_limit_m_s: float = parameter(
-        0.6,
+        0.5,
         'A velocity over ground that differs by more from the one that accelerations give is not '
         'given: the ground moves.',
         low=0.2,

@@ -107,6 +107,23 @@ def test_nothing_is_said_before_it_is_aligned(town):
     assert odometry.add_frame(Frame(picture, 5), 30.0) is Doubt.UNALIGNED
 
 
+@pytest.mark.parametrize(
+    ('pose', 'velocity_m_s'),
+    [
+        ({'north_m': nan}, (0.0, 0.0, 0.0)),
+        ({'down_m': nan}, (0.0, 0.0, 0.0)),
+        ({'quaternion_ned_frd': (0.0, 0.0, 0.0, 0.0)}, (0.0, 0.0, 0.0)),
+        ({}, (0.0, nan, 0.0)),
+    ],
+)
+def test_what_is_not_known_aligns_nothing(fly, pose, velocity_m_s):
+    flight = fly(HOVER)
+    flight.run(6)
+    unknown = replace(flight.motion.pose(flight.time_s), **pose)
+    assert flight.odometry.align(unknown, velocity_m_s) is False
+    assert flight.step().resets == 1
+
+
 def test_an_old_frame_changes_nothing(fly):
     flight = fly(HOVER)
     flight.run(8)

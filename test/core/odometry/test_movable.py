@@ -43,3 +43,9 @@ def test_the_attitude_counts(north_is_unsafe):
 def test_ground_out_of_view_is_not_below(north_is_unsafe):
     ground = np.array([[200.0, -50.0, 0.0], [100.0, 300.0, 0.0]])
     assert not seen(north_is_unsafe).is_below(ground, 0.2).any()
+
+
+def test_safety_that_is_not_a_number_is_below_every_limit(north_is_unsafe):
+    north_is_unsafe[:] = np.nan
+    ground = np.array([[110.0, -50.0, 0.0]])
+    assert seen(north_is_unsafe).is_below(ground, 0.01).all()
