@@ -15,6 +15,7 @@ from peace_ros.core.domain.errors import (
 from peace_ros.core.domain.health import Health, Level
 from peace_ros.core.domain.labels import SAFE_LABELS, Label, is_safe
 from peace_ros.core.domain.motion import HeightReport, Pose, Setpoint, Site, Telemetry
+from peace_ros.core.domain.odometry import InertialSample, MotionEstimate
 from peace_ros.core.domain.perception import DepthImage, Frame, Heatmap, Prompt, RankedWord
 
 __all__ = [
@@ -30,8 +31,10 @@ __all__ = [
     'Heatmap',
     'HeightReport',
     'ImageError',
+    'InertialSample',
     'Label',
     'Level',
+    'MotionEstimate',
     'Mount',
     'PeaceError',
     'Pose',

@@ -2,15 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames, body rates and altitude become position and velocity, without GNSS."""
 
-from peace_ros.core.odometry.estimate import Doubt, MotionEstimate
+from peace_ros.core.odometry.doubt import Doubt
 from peace_ros.core.odometry.estimator import VisualInertialOdometry
-from peace_ros.core.odometry.inertial import InertialSample
 from peace_ros.core.odometry.parameters import OdometryParameters
 
 __all__ = [
     'Doubt',
-    'InertialSample',
-    'MotionEstimate',
     'OdometryParameters',
     'VisualInertialOdometry',
 ]

@@ -17,7 +17,16 @@ from math import hypot, isfinite, radians
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import NADIR, Camera, Frame, Heatmap, Mount, Pose
+from peace_ros.core.domain import (
+    NADIR,
+    Camera,
+    Frame,
+    Heatmap,
+    InertialSample,
+    MotionEstimate,
+    Mount,
+    Pose,
+)
 from peace_ros.core.domain.camera import Quaternion
 from peace_ros.core.domain.geometry import (
     GRAVITY_M_S2,
@@ -28,8 +37,8 @@ from peace_ros.core.domain.geometry import (
 )
 from peace_ros.core.mapping import small_grey
 from peace_ros.core.odometry.coherence import AccelerationCheck
-from peace_ros.core.odometry.estimate import Doubt, MotionEstimate
-from peace_ros.core.odometry.inertial import InertialHistory, InertialMotion, InertialSample
+from peace_ros.core.odometry.doubt import Doubt
+from peace_ros.core.odometry.inertial import InertialHistory, InertialMotion
 from peace_ros.core.odometry.keyframe import (
     Keyframe,
     Matches,

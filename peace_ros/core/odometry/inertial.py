@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from peace_ros.core.domain import InertialSample
 from peace_ros.core.domain.camera import Quaternion
 from peace_ros.core.domain.geometry import (
     multiply,
@@ -30,21 +31,6 @@ _STRONGEST_M_S2 = 160.0
 """Their accelerometers measure up to 16 g."""
 _LONGEST_GAP_NS = 100_000_000
 """Between samples farther apart the rates are not known."""
-
-
-@dataclass(frozen=True)
-class InertialSample:
-    """What an inertial measurement unit measured, in the axes of the vehicle (FRD).
-
-    MAVLink has it in HIGHRES_IMU, and in the units of the sensor in RAW_IMU and SCALED_IMU.
-    """
-
-    stamp_ns: int
-    """Clock of the frames."""
-    rates_rad_s: tuple[float, float, float]
-    """Angular velocity about forward, right, down."""
-    specific_force_m_s2: tuple[float, float, float]
-    """Acceleration without gravity: (0, 0, -9.8) for a level vehicle at rest."""
 
 
 @dataclass(frozen=True)

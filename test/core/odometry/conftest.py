@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from peace_ros.core.domain import NADIR, Camera, Frame
-from peace_ros.core.odometry import MotionEstimate, OdometryParameters, VisualInertialOdometry
+from peace_ros.core.domain import NADIR, Camera, Frame, MotionEstimate
+from peace_ros.core.odometry import OdometryParameters, VisualInertialOdometry
 from peace_ros.lab.evaluation.odometry.motion import InertialUnit, Motion
 from peace_ros.simulation import NadirCamera, draw_world
 

@@ -8,12 +8,10 @@ from math import nan, radians
 import numpy as np
 import pytest
 
-from peace_ros.core.domain import Camera, Distortion, Frame, Heatmap
+from peace_ros.core.domain import Camera, Distortion, Frame, Heatmap, InertialSample, MotionEstimate
 from peace_ros.core.domain.geometry import angle_between, mount_from_degrees
 from peace_ros.core.odometry import (
     Doubt,
-    InertialSample,
-    MotionEstimate,
     OdometryParameters,
     VisualInertialOdometry,
 )

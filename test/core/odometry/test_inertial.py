@@ -7,8 +7,8 @@ from math import inf, nan, pi
 import numpy as np
 import pytest
 
+from peace_ros.core.domain import InertialSample
 from peace_ros.core.domain.geometry import quaternion_from_euler, rotation_matrix
-from peace_ros.core.odometry import InertialSample
 from peace_ros.core.odometry.inertial import InertialHistory
 
 MS = 1_000_000

@@ -10,13 +10,12 @@ from math import cos, pi, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import Pose
+from peace_ros.core.domain import InertialSample, Pose
 from peace_ros.core.domain.geometry import (
     GRAVITY_M_S2,
     quaternion_from_euler,
     rotation_matrix,
 )
-from peace_ros.core.odometry import InertialSample
 
 _STEP_S = 1e-3
 _RATES_NOISE_RAD_S = radians(0.1)

@@ -1,34 +1,30 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the odometry says of a frame: how the vehicle moves, or why that is not known."""
+"""What an inertial unit measured, and how a vehicle moves: what odometry takes and gives."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import Pose
+from peace_ros.core.domain.motion import Pose
 
 
-class Doubt(Enum):
-    """Why a frame does not show how the vehicle moves."""
+@dataclass(frozen=True)
+class InertialSample:
+    """What an inertial measurement unit measured, in the axes of the vehicle (FRD).
 
-    UNALIGNED = 'no position and attitude to begin from'
-    OLD = 'the picture is not newer than the last one'
-    RATES = 'no body rates from the last picture to this one'
-    ALTITUDE = 'the altitude is not known, or below 1 m'
-    SAME = 'the camera gave the same picture twice'
-    TEXTURE = 'the ground has too little texture in two directions'
-    DIFFERENT = 'too few corners of the ground are found again'
-    TURN = 'the pictures turn otherwise than the body rates'
-    ERROR = 'the corners do not move like level ground'
-    MOVABLE = 'too little of the ground in view is sure to keep still'
-    MOVING = 'the velocity over ground does not change as the vehicle is accelerated'
-    BEGINNING = 'too few pictures for a velocity'
-    UNCERTAIN = 'the velocity is too uncertain'
+    MAVLink has it in HIGHRES_IMU, and in the units of the sensor in RAW_IMU and SCALED_IMU.
+    """
+
+    stamp_ns: int
+    """Clock of the frames."""
+    rates_rad_s: tuple[float, float, float]
+    """Angular velocity about forward, right, down."""
+    specific_force_m_s2: tuple[float, float, float]
+    """Acceleration without gravity: (0, 0, -9.8) for a level vehicle at rest."""
 
 
 @dataclass(frozen=True)
