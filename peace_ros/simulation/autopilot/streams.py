@@ -16,9 +16,12 @@ from peace_ros.simulation.autopilot.flight import CRITICAL_BATTERY, LOW_BATTERY,
 from peace_ros.simulation.autopilot.modes import LandedState
 from peace_ros.simulation.autopilot.parameters import AutopilotParameters
 from peace_ros.simulation.autopilot.personality import EKF_STATUS, Personality
+from peace_ros.simulation.autopilot.physics import GRAVITY_M_S2
 
 METRES_PER_DEGREE = 111_319.49
 UNKNOWN_U16 = 65535
+INERTIAL_FIELDS = 0x3F
+"""Fields of HIGHRES_IMU that are new: acceleration and body rates."""
 VELOCITY_ONLY = 0xDC7
 """Type mask of POSITION_TARGET_LOCAL_NED: only the velocity counts."""
 SENSORS = (
@@ -62,7 +65,9 @@ class Streams:
         }
         if self._personality.is_px4:
             self._builders[mavlink.MAVLINK_MSG_ID_ALTITUDE] = self._altitude
+            self._builders[mavlink.MAVLINK_MSG_ID_HIGHRES_IMU] = self._highres_imu
         else:
+            self._builders[mavlink.MAVLINK_MSG_ID_RAW_IMU] = self._raw_imu
             self._builders[mavlink.MAVLINK_MSG_ID_FENCE_STATUS] = lambda flight: (
                 flight.fence.status(flight.position_m, flight.time_s)
             )
@@ -115,6 +120,9 @@ class Streams:
     def _boot_ms(self, flight: Flight) -> int:
         return round((flight.time_s + self._disturbance.clock_step_s) * 1000.0) & 0xFFFFFFFF
 
+    def _boot_us(self, flight: Flight) -> int:
+        return round((flight.time_s + self._disturbance.clock_step_s) * 1e6)
+
     def _local_position_ned(self, flight: Flight) -> Any:
         if not flight.estimator.reports_position(flight.time_s):
             return None
@@ -147,13 +155,28 @@ class Streams:
     def _attitude(self, flight: Flight) -> Any:
         p = flight.physics
         return mavlink.MAVLink_attitude_message(
-            self._boot_ms(flight), p.roll_rad, p.pitch_rad, p.yaw_rad, 0.0, 0.0, p.yaw_rate_rad_s
+            self._boot_ms(flight), p.roll_rad, p.pitch_rad, p.yaw_rad, *p.body_rates_rad_s
         )
 
     def _attitude_quaternion(self, flight: Flight) -> Any:
         p = flight.physics
         return mavlink.MAVLink_attitude_quaternion_message(
-            self._boot_ms(flight), *p.quaternion_ned_frd, 0.0, 0.0, p.yaw_rate_rad_s
+            self._boot_ms(flight), *p.quaternion_ned_frd, *p.body_rates_rad_s
+        )
+
+    def _raw_imu(self, flight: Flight) -> Any:
+        """Return RAW_IMU in the units in which ArduPilot sends it: mG and mrad/s."""
+        force = [each / GRAVITY_M_S2 * 1000.0 for each in flight.physics.specific_force_m_s2]
+        rates = [each * 1000.0 for each in flight.physics.body_rates_rad_s]
+        whole = [max(-32768, min(32767, round(each))) for each in (*force, *rates)]
+        return mavlink.MAVLink_raw_imu_message(self._boot_us(flight), *whole, 0, 0, 0)
+
+    def _highres_imu(self, flight: Flight) -> Any:
+        """Return HIGHRES_IMU with acceleration and body rates only."""
+        p = flight.physics
+        measured = (*p.specific_force_m_s2, *p.body_rates_rad_s)
+        return mavlink.MAVLink_highres_imu_message(
+            self._boot_us(flight), *measured, *(0.0,) * 7, INERTIAL_FIELDS
         )
 
     def _global_position_int(self, flight: Flight) -> Any:
