@@ -241,7 +241,8 @@ class AutopilotSim:
         )
         errors = EstimateErrors(sizes, p.seed)
         gnss = GnssAltitudeError(p.gnss_altitude_noise_m, p.seed)
-        return Flight(physics, self._personality, p.home_altitude_msl_m, errors, gnss)
+        vision = (p.vision_delay_s, p.seed)
+        return Flight(physics, self._personality, p.home_altitude_msl_m, errors, gnss, *vision)
 
     def _note_altitude(self) -> None:
         altitude_m = -self._flight.physics.down_m

@@ -108,6 +108,14 @@ class AutopilotParameters(ParameterSet):
         low=0.0,
         high=20.0,
     )
+    vision_delay_s: float = parameter(
+        0.05,
+        'External navigation belongs to the moment so long before it comes (VISO_DELAY_MS of '
+        'ArduPilot, EKF2_EV_DELAY of PX4).',
+        unit='s',
+        low=0.0,
+        high=0.25,
+    )
     rangefinder_max_m: float = parameter(
         0.0, 'Range of the downward rangefinder; 0: there is none.', unit='m', low=0.0, high=500.0
     )
