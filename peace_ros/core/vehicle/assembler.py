@@ -173,6 +173,11 @@ class Assembler:
         return self._yaw_rad
 
     @property
+    def has_gnss_fix(self) -> bool:
+        """A GNSS receiver has a 3D fix."""
+        return self._gnss.has_fix
+
+    @property
     def home_msl_m(self) -> float | None:
         """Altitude of home above sea level."""
         return self._home.home_msl_m

@@ -176,6 +176,12 @@ class MavlinkLink:
             self._heard().poses.clear()
             return poses
 
+    @property
+    def has_gnss_fix(self) -> bool:
+        """A GNSS receiver has a 3D fix; the position may come from another source nevertheless."""
+        with self._changed:
+            return self._heard().has_gnss_fix
+
     def take_inertial(self) -> list[InertialSample]:
         """Return body rates and accelerations since the last call, oldest first (at most 512).
 
