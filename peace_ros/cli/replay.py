@@ -11,8 +11,12 @@ import typer
 from rich.console import Console
 
 from peace_ros.cli.options import with_options
+from peace_ros.core.domain import ConfigurationError
 from peace_ros.lab.replay import ReplayOptions, SourceOptions
-from peace_ros.lab.replay.console import replay_in_terminal
+from peace_ros.lab.replay.console import compare_in_terminal, replay_in_terminal
+from peace_ros.lab.replay.regression import GoldenOptions
+
+EXIT_FAILED = 1
 
 
 @with_options(SourceOptions)
@@ -25,6 +29,36 @@ def replay(
         Path | None,
         typer.Option(metavar='DIR', help='Empty or new folder; default runs/<source>_replay.'),
     ] = None,
+    assign: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--set',
+            metavar='NODE.PARAMETER=VALUE',
+            help='Another value than that of the preset, as landing.safety_threshold=0.7; repeat '
+            'it for several.',
+        ),
+    ] = None,
+    golden: Annotated[
+        Path | None,
+        typer.Option(
+            metavar='FILE',
+            help='Compare prompts, heatmaps, states, sites and set-points with this file; exit 1 '
+            'on a difference. It is made when it does not exist.',
+        ),
+    ] = None,
+    remake_golden: Annotated[
+        bool, typer.Option('--remake-golden', help='Write the file of --golden anew.')
+    ] = False,
+    junit: Annotated[
+        Path | None,
+        typer.Option(metavar='FILE', help='Write the comparison as JUnit XML; with --golden.'),
+    ] = None,
 ) -> None:
     """Run prompts, segmentation and landing over a recording; the vehicle cannot be moved."""
-    replay_in_terminal(ReplayOptions(source, config, out, options), Console())
+    replayed, console = ReplayOptions(source, config, out, options, tuple(assign or ())), Console()
+    if golden is None:
+        if remake_golden or junit is not None:
+            raise ConfigurationError('--remake-golden and --junit compare nothing: give --golden')
+        replay_in_terminal(replayed, console)
+    elif not compare_in_terminal(replayed, GoldenOptions(golden, remake_golden, junit), console):
+        raise typer.Exit(EXIT_FAILED)

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
@@ -72,6 +73,14 @@ class Preset:
             if section in WILDCARDS or _node_of(section) == node:
                 values.update(given)
         return values
+
+    def with_values(self, node: str, given: Mapping[str, Any]) -> Preset:
+        """Return the preset with other values for a node: those go before the ones of the file."""
+        known = named(groups_of(node))
+        own = {name: value for name, value in self._values_for(node).items() if name in known}
+        section = f'/**/{node}'
+        others = {name: values for name, values in self.sections.items() if name != section}
+        return replace(self, sections={**others, section: {**own, **given}})
 
     def check(self) -> None:
         """Refuse what a node would refuse.

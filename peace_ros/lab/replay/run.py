@@ -11,7 +11,8 @@ from pathlib import Path
 
 from peace_ros.core.domain import PeaceError, RecordingError
 from peace_ros.core.pipeline import SegmentedFrame
-from peace_ros.core.presets import DEFAULT_PRESET, load_preset
+from peace_ros.core.presets import DEFAULT_PRESET, Preset, load_preset
+from peace_ros.lab.replay.assignments import preset_with
 from peace_ros.lab.replay.line import ReplayLine, Step
 from peace_ros.lab.replay.outputs import ReplayOutputs
 from peace_ros.lab.replay.report import ReplayReport, ReportBuilder
@@ -22,6 +23,7 @@ from peace_ros.lab.replay.source import (
     VideoSource,
     open_source,
 )
+from peace_ros.lab.replay.trace import TraceBuilder
 from peace_ros.recording.run_folder import create_run_folder
 
 Progress = Callable[[int, int, str], None]
@@ -40,6 +42,17 @@ class ReplayOptions:
     out: Path | None = None
     """Folder of the results; None: ``runs/<name of the source>_replay`` where the user stands."""
     part: SourceOptions = field(default_factory=SourceOptions)
+    assignments: tuple[str, ...] = ()
+    """Parameters in place of those of the preset, each ``NODE.PARAMETER=VALUE``."""
+
+    @property
+    def preset(self) -> Preset:
+        """The parameters of the three nodes.
+
+        Raises:
+            ConfigurationError: one of them cannot be used.
+        """
+        return preset_with(self.config, self.assignments)
 
     def new_folder(self) -> Path:
         """Return the output folder, created.
@@ -50,17 +63,25 @@ class ReplayOptions:
         return create_run_folder(self.out, f'{self.source.resolve().stem}_replay', '--out')
 
 
-def replay(options: ReplayOptions, progress: Progress | None = None) -> tuple[ReplayReport, Path]:
+def replay(
+    options: ReplayOptions, progress: Progress | None = None, trace: TraceBuilder | None = None
+) -> tuple[ReplayReport, Path]:
     """Replay a recording; return what was found and the folder of the results.
+
+    Args:
+        options: what is replayed, and how.
+        progress: is told how far the replay is.
+        trace: gets every answer.
 
     Raises:
         PeaceError: source, configuration, models or output folder cannot be used, or no frame
             of the recording can.
     """
+    preset = options.preset
     source = open_source(options.source, options.part)
-    replayer = Replayer(source, options.config)
+    replayer = Replayer(source, preset)
     folder = options.new_folder()
-    title = f'{options.source.name}, {options.config}'
+    title = f'{options.source.name}, {preset.name}'
     video_hz = source.frame_hz if isinstance(source, VideoSource) else None
     with ReplayOutputs(folder, source.count, video_hz, title) as outputs:
         newest: Step | None = None
@@ -68,8 +89,12 @@ def replay(options: ReplayOptions, progress: Progress | None = None) -> tuple[Re
             if isinstance(each, Step):
                 newest = each
                 outputs.add_step(each)
+                if trace is not None:
+                    trace.add_step(each)
                 continue
             outputs.add_look(each, newest)
+            if trace is not None:
+                trace.add_look(each)
             if progress is not None:
                 doing = newest.decision.state.value if newest is not None else ''
                 progress(replayer.report.frames, source.count, doing)
@@ -86,10 +111,10 @@ class Replayer:
     """Runs the line over a source and counts what it finds."""
 
     def __init__(
-        self, source: RecordingSource, config: str = DEFAULT_PRESET, *, threads: int = 1
+        self, source: RecordingSource, preset: Preset | str = DEFAULT_PRESET, *, threads: int = 1
     ) -> None:
         self._source = source
-        self._preset = load_preset(config)
+        self._preset = preset if isinstance(preset, Preset) else load_preset(preset)
         self._threads = threads
         heights = [round(pose.altitude_agl_m, 1) for pose in source.poses]
         self._builder = ReportBuilder(
