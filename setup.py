@@ -35,6 +35,7 @@ NODES = (
     'segmentation',
     'perception',
     'landing',
+    'recorder',
     'satellite_view',
     'autopilot_sim',
 )

@@ -24,7 +24,13 @@ def replay(
     *,
     options: SourceOptions,
     source: Annotated[Path, typer.Argument(help='Bag (folder, .mcap, .db3) or video file.')],
-    config: Annotated[str, typer.Option(metavar='PRESET', help='Preset or file.')] = 'peace_cs',
+    config: Annotated[
+        str | None,
+        typer.Option(
+            metavar='PRESET',
+            help='Preset or file; default: what a file of the flight recorder says, else peace_cs.',
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar='DIR', help='Empty or new folder; default runs/<source>_replay.'),

@@ -10,21 +10,20 @@ from typing import Any
 
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.node_parameters import FLYING_NODES
-from peace_ros.core.presets import Preset, load_preset
+from peace_ros.core.presets import Preset
 from peace_ros.core.yaml_files import value_of
 
 
-def preset_with(name_or_path: str, assignments: Sequence[str]) -> Preset:
+def with_assignments(preset: Preset, assignments: Sequence[str]) -> Preset:
     """Return a preset with other values of some parameters.
 
     Args:
-        name_or_path: of the preset.
+        preset: stays as it is.
         assignments: each ``NODE.PARAMETER=VALUE``, the value as ROS reads it.
 
     Raises:
-        ConfigurationError: the preset, a node, a parameter or a value cannot be used.
+        ConfigurationError: a node, a parameter or a value cannot be used.
     """
-    preset = load_preset(name_or_path)
     for each in assignments:
         node, parameter, value = _parsed(each)
         try:

@@ -9,12 +9,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from peace_ros.core.domain import PeaceError, RecordingError
+from peace_ros.core.domain import NADIR, Mount, PeaceError, RecordingError
+from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.core.pipeline import SegmentedFrame
 from peace_ros.core.presets import DEFAULT_PRESET, Preset, load_preset
-from peace_ros.lab.replay.assignments import preset_with
+from peace_ros.lab.replay.assignments import with_assignments
 from peace_ros.lab.replay.line import ReplayLine, Step
 from peace_ros.lab.replay.outputs import ReplayOutputs
+from peace_ros.lab.replay.recorded import recorded_preset
 from peace_ros.lab.replay.report import ReplayReport, ReportBuilder
 from peace_ros.lab.replay.source import (
     RecordingSource,
@@ -38,7 +40,8 @@ class ReplayOptions:
     """What a user may ask of ``peace replay``."""
 
     source: Path
-    config: str = DEFAULT_PRESET
+    config: str | None = None
+    """Preset; None: the parameters in a file of the flight recorder, else the default preset."""
     out: Path | None = None
     """Folder of the results; None: ``runs/<name of the source>_replay`` where the user stands."""
     part: SourceOptions = field(default_factory=SourceOptions)
@@ -52,7 +55,10 @@ class ReplayOptions:
         Raises:
             ConfigurationError: one of them cannot be used.
         """
-        return preset_with(self.config, self.assignments)
+        recorded = recorded_preset(self.source) if self.config is None else None
+        return with_assignments(
+            recorded or load_preset(self.config or DEFAULT_PRESET), self.assignments
+        )
 
     def new_folder(self) -> Path:
         """Return the output folder, created.
@@ -173,8 +179,14 @@ class Replayer:
         return ReplayLine(
             self._preset,
             self._source.options.assumed_camera(width, height),
-            self._source.mount,
+            self._mount(),
             self._source.poses,
             self._source.engage_ns,
             threads=self._threads,
         )
+
+    def _mount(self) -> Mount:
+        """Return how the camera sits: by the user, /tf_static, or the parameters of the landing."""
+        if self._source.options.mount is None and self._source.mount == NADIR:
+            return self._preset.fill('landing', CameraOptions).mount
+        return self._source.mount
