@@ -13,8 +13,13 @@ from rich.console import Console
 from peace_ros.cli.options import with_options
 from peace_ros.core.domain import ConfigurationError
 from peace_ros.lab.replay import ReplayOptions, SourceOptions
-from peace_ros.lab.replay.console import compare_in_terminal, replay_in_terminal
+from peace_ros.lab.replay.console import (
+    compare_in_terminal,
+    compare_presets_in_terminal,
+    replay_in_terminal,
+)
 from peace_ros.lab.replay.regression import GoldenOptions
+from peace_ros.lab.replay.segment import Segment
 
 EXIT_FAILED = 1
 
@@ -44,6 +49,26 @@ def replay(
             'it for several.',
         ),
     ] = None,
+    segment: Annotated[
+        str | None,
+        typer.Option(metavar='START:END', help='Seconds since the first frame; default: all.'),
+    ] = None,
+    engage_at: Annotated[
+        float | None,
+        typer.Option(
+            metavar='S',
+            help='Begin the landing so long after the first frame; default: when the recorded '
+            'landing began, else at once.',
+        ),
+    ] = None,
+    compare: Annotated[
+        tuple[str, str] | None,
+        typer.Option(
+            metavar='A B',
+            help='Replay with two presets or parameter files and write a page that compares '
+            'them; --set counts for B alone.',
+        ),
+    ] = None,
     golden: Annotated[
         Path | None,
         typer.Option(
@@ -61,10 +86,23 @@ def replay(
     ] = None,
 ) -> None:
     """Run prompts, segmentation and landing over a recording; the vehicle cannot be moved."""
-    replayed, console = ReplayOptions(source, config, out, options, tuple(assign or ())), Console()
-    if golden is None:
-        if remake_golden or junit is not None:
-            raise ConfigurationError('--remake-golden and --junit compare nothing: give --golden')
+    console = Console()
+    replayed = ReplayOptions(
+        source,
+        config,
+        out,
+        options,
+        tuple(assign or ()),
+        Segment() if segment is None else Segment.parse(segment),
+        engage_at,
+    )
+    if golden is None and (remake_golden or junit is not None):
+        raise ConfigurationError('--remake-golden and --junit compare nothing: give --golden')
+    if compare is not None:
+        if golden is not None or config is not None:
+            raise ConfigurationError('--compare names both presets: leave out --config, --golden')
+        compare_presets_in_terminal(replayed, compare, console)
+    elif golden is None:
         replay_in_terminal(replayed, console)
     elif not compare_in_terminal(replayed, GoldenOptions(golden, remake_golden, junit), console):
         raise typer.Exit(EXIT_FAILED)

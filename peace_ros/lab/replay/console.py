@@ -61,6 +61,26 @@ def compare_in_terminal(
     return result.passed
 
 
+def compare_presets_in_terminal(
+    options: run.ReplayOptions, presets: tuple[str, str], console: Console
+) -> None:
+    """Replay with two presets, and print both and where their page is.
+
+    Raises:
+        PeaceError: as :func:`peace_ros.lab.replay.side_by_side.replay_side_by_side` does.
+    """
+    # Here, because the page needs an extra that other replays do without.
+    from peace_ros.lab.replay.side_by_side import figures, replay_side_by_side  # noqa: PLC0415
+
+    with _shown(console) as show:
+        sides, page = replay_side_by_side(options, presets, show)
+    table = Table('', *(each.name for each in sides))
+    for heading, cells in figures(sides):
+        table.add_row(heading, *cells)
+    console.print(table)
+    console.print(f'page: {page}', highlight=False)
+
+
 @contextmanager
 def _shown(console: Console) -> Iterator[run.Progress]:
     """Show a progress bar; yield what it is told with."""

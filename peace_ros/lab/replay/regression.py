@@ -5,22 +5,17 @@
 from __future__ import annotations
 
 import json
-from bisect import bisect_right
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import numpy as np
-
-from peace_ros.core.domain import Frame, Heatmap, RecordingError
-from peace_ros.core.segmentation import draw_overlay
+from peace_ros.core.domain import RecordingError
 from peace_ros.lab.replay.golden import Check, compare, first_difference_ns
 from peace_ros.lab.replay.junit import write_junit
+from peace_ros.lab.replay.moments import moment_sheets
 from peace_ros.lab.replay.report import ReplayReport
 from peace_ros.lab.replay.run import Progress, ReplayOptions, replay
-from peace_ros.lab.replay.source import open_source
 from peace_ros.lab.replay.trace import Trace, TraceBuilder
 from peace_ros.recording import save_picture
-from peace_ros.recording.contact_sheet import Cell, draw_contact_sheet
 from peace_ros.recording.run_folder import write_whole
 
 
@@ -97,7 +92,9 @@ def replay_regression(
     checks = compare(found, expected)
     first_ns = first_difference_ns(checks)
     if first_ns is not None:
-        _draw_difference(options, found, expected, first_ns, folder / 'difference.png')
+        traces = {'golden': expected, 'now': found}
+        for sheet in moment_sheets(options, traces, [first_ns], 'first difference'):
+            save_picture(sheet, folder / 'difference.png')
     told = {
         'passed': all(each.passed for each in checks),
         'first_difference_ns': first_ns,
@@ -109,46 +106,3 @@ def replay_regression(
     if golden.junit is not None:
         write_junit(golden.junit, f'replay {options.source.name}', checks, report.elapsed_s)
     return Regression(report, folder, found, expected, checks, first_ns)
-
-
-def _draw_difference(
-    options: ReplayOptions, found: Trace, golden: Trace, at_ns: int, path: Path
-) -> None:
-    """Write the frame of a moment with what each replay made of it."""
-    frame = _frame_at(options, at_ns)
-    if frame is None:
-        return
-    cells = [
-        Cell(frame.image_rgb, f'frame at {frame.stamp_ns * 1e-9:.1f} s', options.source.name),
-        _cell('golden', golden, frame, at_ns),
-        _cell('now', found, frame, at_ns),
-    ]
-    save_picture(draw_contact_sheet(cells, f'first difference at {at_ns * 1e-9:.1f} s'), path)
-
-
-def _frame_at(options: ReplayOptions, at_ns: int) -> Frame | None:
-    """Return the last usable frame up to a moment, or the first one."""
-    newest: Frame | None = None
-    for taken in open_source(options.source, options.part).frames():
-        if newest is not None and taken.stamp_ns > at_ns:
-            break
-        newest = taken.frame or newest
-    return newest
-
-
-def _cell(name: str, trace: Trace, frame: Frame, at_ns: int) -> Cell:
-    """Return the frame as a replay saw it, with its decision of the moment."""
-    index = int(np.searchsorted(trace.frame_stamps_ns, frame.stamp_ns))
-    is_there = index < len(trace.masks) and trace.frame_stamps_ns[index] == frame.stamp_ns
-    step = bisect_right(trace.step_stamps_ns.tolist(), at_ns) - 1
-    state, told = 'no decision', ''
-    if step >= 0:
-        north_m, east_m = trace.sites_m[step]
-        state = trace.states[step]
-        place = f'site {north_m:.1f} N, {east_m:.1f} E m' if np.isfinite(north_m) else 'no site'
-        north, east, down = trace.setpoints_m_s[step]
-        told = f'{place}; set-point {north:.2f} N, {east:.2f} E, {down:.2f} down m/s; '
-    if not is_there:
-        return Cell(frame.image_rgb, f'{name}: {state}, no heatmap', told)
-    heatmap = Heatmap(trace.safe(index).astype(np.float32), frame.stamp_ns)
-    return Cell(draw_overlay(frame, heatmap), f'{name}: {state}', told + trace.prompts[index])

@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 
 from peace_ros.core.domain import NADIR, Mount, PeaceError, RecordingError
@@ -18,6 +19,7 @@ from peace_ros.lab.replay.line import ReplayLine, Step
 from peace_ros.lab.replay.outputs import ReplayOutputs
 from peace_ros.lab.replay.recorded import recorded_preset
 from peace_ros.lab.replay.report import ReplayReport, ReportBuilder
+from peace_ros.lab.replay.segment import Segment
 from peace_ros.lab.replay.source import (
     RecordingSource,
     SourceOptions,
@@ -31,6 +33,7 @@ from peace_ros.recording.run_folder import create_run_folder
 Progress = Callable[[int, int, str], None]
 """Called with frames done, frames in all, and what the landing core does."""
 
+_WHOLE = Segment()
 _TAIL_NS = 1_000_000_000
 """Decisions go on for this long after the last frame."""
 
@@ -47,6 +50,16 @@ class ReplayOptions:
     part: SourceOptions = field(default_factory=SourceOptions)
     assignments: tuple[str, ...] = ()
     """Parameters in place of those of the preset, each ``NODE.PARAMETER=VALUE``."""
+    segment: Segment = field(default_factory=Segment)
+    engage_at_s: float | None = None
+    """When the landing begins, in seconds since the first frame; None: as recorded, else with the
+    first frame that is replayed."""
+
+    def __post_init__(self) -> None:
+        if self.engage_at_s is not None and not 0.0 <= self.engage_at_s < inf:
+            raise RecordingError(
+                f'--engage-at {self.engage_at_s}: give seconds since the first frame, 0 or more'
+            )
 
     @property
     def preset(self) -> Preset:
@@ -85,7 +98,7 @@ def replay(
     """
     preset = options.preset
     source = open_source(options.source, options.part)
-    replayer = Replayer(source, preset)
+    replayer = Replayer(source, preset, segment=options.segment, engage_at_s=options.engage_at_s)
     folder = options.new_folder()
     title = f'{options.source.name}, {preset.name}'
     video_hz = source.frame_hz if isinstance(source, VideoSource) else None
@@ -103,7 +116,12 @@ def replay(
                 trace.add_look(each)
             if progress is not None:
                 doing = newest.decision.state.value if newest is not None else ''
-                progress(replayer.report.frames, source.count, doing)
+                progress(replayer.read, source.count, doing)
+        if not replayer.report.frames and not replayer.report.unusable_frames:
+            raise RecordingError(
+                f'{options.source}: no frame lies in the segment, the last one is '
+                f'{replayer.last_s:.1f} s after the first'
+            )
         if not replayer.report.frames:
             raise RecordingError(
                 f'{options.source}: none of {replayer.report.unusable_frames} frames can be used; '
@@ -117,9 +135,20 @@ class Replayer:
     """Runs the line over a source and counts what it finds."""
 
     def __init__(
-        self, source: RecordingSource, preset: Preset | str = DEFAULT_PRESET, *, threads: int = 1
+        self,
+        source: RecordingSource,
+        preset: Preset | str = DEFAULT_PRESET,
+        *,
+        threads: int = 1,
+        segment: Segment = _WHOLE,
+        engage_at_s: float | None = None,
     ) -> None:
-        self._source = source
+        self._source, self._segment, self._engage_at_s = source, segment, engage_at_s
+        self.read = 0
+        """Frames that have been read, also outside of the segment."""
+        self.last_s = 0.0
+        """The last of them, in seconds since the first."""
+        self._first_ns: int | None = None
         self._preset = preset if isinstance(preset, Preset) else load_preset(preset)
         self._threads = threads
         heights = [round(pose.altitude_agl_m, 1) for pose in source.poses]
@@ -142,10 +171,9 @@ class Replayer:
             PeaceError: models or parameters cannot be used, or the recording breaks off.
         """
         began = time.monotonic()
-        frames = self._source.frames()
         line: ReplayLine | None = None
         last_ns = 0
-        for taken in frames:
+        for taken in self._frames():
             if taken.frame is None:
                 self._builder.add_fault(taken.fault)
                 continue
@@ -171,6 +199,23 @@ class Replayer:
                 yield step
         self.report.elapsed_s = time.monotonic() - began
 
+    def _frames(self) -> Iterator[Taken]:
+        """Yield the frames of the segment."""
+        for taken in self._source.frames():
+            self.read += 1
+            if self._first_ns is None:
+                self._first_ns = taken.stamp_ns
+            self.last_s = (taken.stamp_ns - self._first_ns) * 1e-9
+            if self.last_s > self._segment.end_s:
+                return
+            if self.last_s >= self._segment.start_s:
+                yield taken
+
+    def _engage_ns(self) -> int | None:
+        if self._engage_at_s is None:
+            return self._source.engage_ns
+        return (self._first_ns or 0) + round(self._engage_at_s * 1e9)
+
     def _line(self, taken: Taken) -> ReplayLine:
         """Load the models when the size of the images is known."""
         if taken.frame is None:
@@ -181,7 +226,7 @@ class Replayer:
             self._source.options.assumed_camera(width, height),
             self._mount(),
             self._source.poses,
-            self._source.engage_ns,
+            self._engage_ns(),
             threads=self._threads,
         )
 
