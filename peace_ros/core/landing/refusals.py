@@ -17,6 +17,8 @@ from peace_ros.core.landing.worth import Merits, worth
 from peace_ros.core.mapping import MapLayers
 
 MOST_REFUSED = 5
+_THING_M = 3.0
+"""Vetoed ground wider than this is unsafe itself (a road, a river), narrower is a thing on it."""
 _NS = 1e-9
 
 
@@ -25,8 +27,9 @@ def refused_places(
 ) -> tuple[RefusedPlace, ...]:
     """Return the refused places of the highest worth, at most five, the best first.
 
-    A place is refused when its ground may be safe (a score of 0.5, or a veto that will end), is as
-    wide as the vehicle, and no site may be chosen within the clearance that a site needs.
+    A place is refused when its ground may be safe (a score of 0.5, or a veto for something
+    narrow on it), is as wide as the vehicle, and no site may be chosen within the clearance
+    that a site needs.
 
     Args:
         layers: Of all ground that a person wants to be told about; the focus does not count.
@@ -37,15 +40,15 @@ def refused_places(
     p, required_m = parameters, search.required_clearance_m
     if layers.score.size == 0:
         return ()
-    vetoed = np.isfinite(layers.unsafe_age_s)
-    possible = (layers.looks > 0) & (vetoed | (layers.score >= CELL_SCORE_FLOOR))
+    thing = _things(layers)
+    possible = (layers.looks > 0) & (thing | (layers.score >= CELL_SCORE_FLOOR))
     possible_m = clearance(possible, layers.cell_m)
     value = worth(
         Merits(
             clearance_m=possible_m,
             # A veto makes the score zero; without it the ground would be doubtful at least.
             confidence=confidence(
-                np.where(vetoed, np.float32(CELL_SCORE_FLOOR), layers.score),
+                np.where(thing, np.float32(CELL_SCORE_FLOOR), layers.score),
                 required_m,
                 layers.cell_m,
             ),
@@ -66,6 +69,15 @@ def refused_places(
             found.append(RefusedPlace(north_m, east_m, wide_m, away_m, reason))
         value[layers.disc(north_m, east_m, wide_m + required_m)] = 0.0
     return tuple(found)
+
+
+def _things(layers: MapLayers) -> NDArray[np.bool_]:
+    """Return the vetoed cells that are narrow enough to be a person, a car, or the like."""
+    vetoed = np.isfinite(layers.unsafe_age_s)
+    cells = max(1, round(_THING_M / layers.cell_m))
+    kernel = cast('NDArray[np.uint8]', cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (cells, cells)))
+    wide = cv2.morphologyEx(vetoed.astype(np.uint8), cv2.MORPH_OPEN, kernel)
+    return cast('NDArray[np.bool_]', vetoed & (wide == 0))
 
 
 def _near_a_site(layers: MapLayers, search: Search, p: LandingParameters) -> NDArray[np.bool_]:

@@ -69,7 +69,6 @@ def test_ground_narrower_than_the_vehicle_is_no_place():
 @pytest.mark.parametrize(
     ('layer', 'value', 'reason'),
     [
-        ('unsafe_age_s', 3.0, 'something clearly unsafe was seen there 3 s ago'),
         ('looks', 1, 'seen 1 times, 3 are needed'),
         ('age_s', 14.0, 'last seen 14 s ago, at most 10 s are allowed'),
         ('score', 0.7, 'not clearly safe: a score of 0.70, 0.80 is needed'),
@@ -78,7 +77,6 @@ def test_ground_narrower_than_the_vehicle_is_no_place():
 def test_says_what_a_wide_place_is_missing(layer, value, reason):
     layers = layers_with(LAWN)
     getattr(layers, layer)[layers.disc(*LAWN)] = value
-    layers.score[np.isfinite(layers.unsafe_age_s)] = 0.0
     assert reason in the_one(layers).reason
 
 
@@ -87,6 +85,13 @@ def test_a_person_on_a_lawn_refuses_the_lawn_though_the_veto_makes_its_score_zer
     person = layers.disc(0.0, 0.0, 1.0)
     layers.score[person], layers.unsafe_age_s[person] = 0.0, 2.0
     assert 'unsafe was seen there 2 s ago' in the_one(layers).reason
+
+
+def test_ground_that_is_unsafe_itself_such_as_a_river_is_no_refused_place():
+    layers = layers_with()
+    river = layers.disc(0.0, 0.0, 9.0)
+    layers.score[river], layers.unsafe_age_s[river] = 0.0, 2.0
+    assert refused_places(layers, SEARCH, P, 0) == ()
 
 
 def test_a_failed_place_says_how_long_it_is_left_out():
