@@ -37,6 +37,7 @@ NODES = (
     'landing',
     'satellite_view',
     'autopilot_sim',
+    'watch',
 )
 
 
@@ -62,6 +63,7 @@ setup(
         **{f'{NAME}.{folder}': ['**/*'] for folder in SHIPPED},
         f'{NAME}.lab.evaluation.segmentation': ['templates/*.j2'],
         f'{NAME}.lab.experiment.report': ['templates/*.j2'],
+        f'{NAME}.watch': ['page/*'],
     },
     exclude_package_data={f'{NAME}.config': DATA_LEFT_OUT} if SHIPPED else {},
     data_files=[
