@@ -27,6 +27,7 @@ SHARED = (
     'config/*.xml',
     'config/presets/*.yaml',
     'config/rviz/*.rviz',
+    'config/foxglove/*.json',
     'config/sros2/*.xml',
 )
 
