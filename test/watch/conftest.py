@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import importlib.util
+import threading
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
@@ -29,6 +30,7 @@ class Served:
         self.commands: list[str] = []
         self.defects: list[BaseException] = []
         self.answer = (True, 'engaged')
+        self._over = threading.Event()
         self.server = PageServer(
             self.ledger, self._take, port=0, viewers=3, on_defect=self.defects.append
         )
@@ -41,15 +43,30 @@ class Served:
         return done
 
     def show(self, scene: str) -> None:
+        """Say once what the landing is in."""
         SCENES.show(self.ledger, scene)
         self.server.news()
+
+    def keep(self, scene: str) -> None:
+        """Say it again and again, so that it does not become old."""
+
+        def say() -> None:
+            while not self._over.wait(0.1):
+                self.show(scene)
+
+        self.show(scene)
+        threading.Thread(target=say, daemon=True).start()
+
+    def close(self) -> None:
+        self._over.set()
+        self.server.close()
 
 
 @pytest.fixture
 def served() -> Iterator[Served]:
     served = Served()
     yield served
-    served.server.close()
+    served.close()
     assert served.defects == []
 
 

@@ -76,7 +76,7 @@ def test_says_where_it_lands_why_not_nearer_and_what_stops_it(
     served, scenes, visit, size, theme, scene
 ):
     scenes.fill(served.ledger)
-    served.show(scene)
+    served.keep(scene)
     seen = visit(size, theme)
     seen.shows('state', scenes.SCENES[scene]['state'])
     seen.shows('reason', scenes.SCENES[scene]['reason'][1:])
@@ -116,7 +116,7 @@ def test_a_refused_place_gives_its_reason_under_the_pointer_and_by_the_keyboard(
     served, scenes, visit
 ):
     scenes.fill(served.ledger)
-    served.show('aiming')
+    served.keep('aiming')
     seen = visit()
     mark = seen.page.locator('#map [data-kind="refused 2"]')
     mark.wait_for()
@@ -130,17 +130,16 @@ def test_the_keyboard_reaches_every_place_and_stays_there_while_the_map_is_drawn
     served, scenes, visit
 ):
     scenes.fill(served.ledger)
-    served.show('aiming')
+    served.keep('aiming')
     seen = visit()
     mark = seen.page.locator('#map [data-kind="site"]')
     mark.focus()
-    served.show('aiming')
-    seen.page.wait_for_timeout(400)
+    seen.page.wait_for_timeout(600)
     assert seen.page.evaluate('document.activeElement.dataset.kind') == 'site'
 
 
 def test_engaging_takes_two_steps_and_tells_the_answer(served, scenes, visit):
-    served.show('idle')
+    served.keep('idle')
     seen = visit()
     seen.shows('state', 'IDLE')
     assert 'token' not in seen.page.url
@@ -192,7 +191,7 @@ def test_a_server_that_ends_is_said_on_the_page(served, visit):
 
 def test_the_past_can_be_read_back(served, scenes, visit):
     scenes.fill(served.ledger)
-    served.show('aiming')
+    served.keep('aiming')
     seen = visit()
     seen.shows('state', 'AIMING')
     seen.page.locator('#back').fill('-150')

@@ -7,6 +7,8 @@ import { LEVELS, drawAltitude, drawCameraMarks, drawMap, drawTimeline, words } f
 
 const $ = (id) => document.getElementById(id);
 const KEPT_S = 600, SAMPLE_S = 0.5, EVENTS = 200, LOST_S = 1.5;
+// Words are new with every message; what is drawn of many points, less often: phones are slow.
+const DRAW_S = 0.25;
 const SYMBOLS = { good: '\u2713', active: '\u25CF', warn: '!', bad: '\u2715', none: '\u25CB' };
 const ARROWS = { LANDING: '\u25BC', CLIMBING: '\u25B2' };
 
@@ -15,7 +17,7 @@ if (token) sessionStorage.setItem('token', token);
 // Not in the history, not in a screenshot.
 if (location.hash) history.replaceState(null, '', location.pathname);
 
-let state = null, marks = [], ground = null, samples = [], events = [], heardAt = 0, retryMs = 250;
+let state = null, marks = [], ground = null, samples = [], events = [], heardAt = 0, drawnAt = 0, retryMs = 250;
 const pictures = {};
 
 function say(id, text) {
@@ -116,9 +118,12 @@ function show() {
   showPlaces();
   showPrompt();
   showFindings();
-  drawMap($('map'), $('map-caption'), state, samples, ground);
   showAges();
-  showPast();
+  if (nowS() - drawnAt >= DRAW_S) {
+    drawnAt = nowS();
+    drawMap($('map'), $('map-caption'), state, samples, ground);
+    showPast();
+  }
   for (const [id, possible] of [['engage', true], ['disengage', true]]) $(id).disabled = !token || state.silent || !possible;
   if (!token) say('answer', 'Commands need the address with its token that peace watch has printed.');
 }
