@@ -16,7 +16,7 @@ from typing import Any
 
 from peace_ros.core.domain import Pose
 from peace_ros.core.prompting.pairs import prompt_from_pairs
-from peace_ros.watch.timeline import PastMoment, Timeline
+from peace_ros.watch.timeline import KEPT_S, PastMoment, Timeline
 from peace_ros.watch.words import STOPS, UNKNOWN, in_words
 
 SILENT_S = 1.5
@@ -128,6 +128,12 @@ class Ledger:
         """Take what nodes report of their tasks."""
         with self.lock:
             self._findings.update({each.name: each for each in findings})
+            newest_s = max((each.heard_s for each in findings), default=0.0)
+            self._findings = {
+                name: each
+                for name, each in self._findings.items()
+                if newest_s - each.heard_s <= KEPT_S
+            }
 
     def hear_pose(self, pose: Pose) -> None:
         """Keep a pose for the pictures around its stamp."""

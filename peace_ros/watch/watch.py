@@ -46,6 +46,9 @@ from peace_ros.watch.tickets import ACTIONS
 _STATUS = 'landing/status'
 _TURN_S = 0.2
 _GRAPH_S = 2.0
+_INFOS = 10
+"""Kept until the overlays of their frames arrive."""
+_MOST_CELLS = 4_000_000
 _PARAMETERS = (
     *('camera_width', 'camera_height', 'camera_fov', 'mount_source'),
     *('mount_roll', 'mount_pitch', 'mount_yaw', 'mount_x', 'mount_y', 'mount_z'),
@@ -74,7 +77,6 @@ class WatchNode(PeaceNode):
         self._graph_due_s = 0.0
         self._commands = {name: self.create_client(Trigger, f'landing/{name}') for name in ACTIONS}
         self._landing = AsyncParameterClient(self, 'landing')
-        self._asked: Any = None
         self.create_subscription(DiagnosticArray, _STATUS, self._on_status, RESULT)
         self.create_subscription(DiagnosticArray, 'prompt', self._on_prompt, RESULT)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_findings, RESULT)
@@ -110,8 +112,10 @@ class WatchNode(PeaceNode):
             return answer
 
         def take(asked: Any) -> None:
-            result = asked.result()
-            answer.set_result((bool(result.success), str(result.message)))
+            # Cancelled by the page when the answer took too long.
+            if answer.set_running_or_notify_cancel():
+                result = asked.result()
+                answer.set_result((bool(result.success), str(result.message)))
 
         client.call_async(Trigger.Request()).add_done_callback(take)
         return answer
@@ -151,16 +155,17 @@ class WatchNode(PeaceNode):
         with self.ledger.lock:
             self.ledger.problem = problem
             self.ledger.others = others
-        if self._asked is None and self._landing.services_are_ready():
-            self._asked = self._landing.get_parameters(list(_PARAMETERS))
-            self._asked.add_done_callback(self._on_parameters)
+        # Asked again each time: the node may have been started anew, or a parameter is live.
+        if self._landing.services_are_ready():
+            self._landing.get_parameters(list(_PARAMETERS), self._on_parameters)
 
     def _on_parameters(self, asked: Any) -> None:
-        self._asked = None
         values = [parameter_value_to_python(each) for each in asked.result().values]
-        if len(values) == len(_PARAMETERS):
-            with self.ledger.lock:
-                self.ledger.parameters = dict(zip(_PARAMETERS, values, strict=True))
+        known = dict(zip(_PARAMETERS, values, strict=False))
+        with self.ledger.lock:
+            self.ledger.parameters = {
+                name: value for name, value in known.items() if value is not None
+            }
 
     def _on_status(self, message: DiagnosticArray) -> None:
         level = int.from_bytes(message.status[0].level, 'little') if message.status else 0
@@ -193,10 +198,15 @@ class WatchNode(PeaceNode):
         )
 
     def _on_pose(self, message: PoseStamped) -> None:
-        self.ledger.hear_pose(pose_from_message(message))
+        try:
+            self.ledger.hear_pose(pose_from_message(message))
+        except PeaceError as error:
+            self.say('pose', str(error))
 
     def _on_frame_info(self, message: CameraInfo) -> None:
-        self._infos = {stamp_ns_of(message): message}
+        self._infos[stamp_ns_of(message)] = message
+        while len(self._infos) > _INFOS:
+            del self._infos[next(iter(self._infos))]
 
     def _on_overlay(self, message: CompressedImage) -> None:
         stamp_ns = stamp_ns_of(message)
@@ -221,17 +231,21 @@ class WatchNode(PeaceNode):
         return [] if camera is None else marks(self.ledger.circles(), camera, mount, pose)
 
     def _on_map(self, message: OccupancyGrid) -> None:
+        rows, columns = message.info.height, message.info.width
+        if not 0 < rows * columns == len(message.data) <= _MOST_CELLS:
+            self.say('map', f'a map of {columns} x {rows} cells with {len(message.data)} values')
+            return
         self._pictures += 1
         origin = message.info.origin.position
         cell_m = message.info.resolution
         meta = {
             'west_m': origin.x,
             'south_m': origin.y,
-            'width_m': message.info.width * cell_m,
-            'height_m': message.info.height * cell_m,
+            'width_m': columns * cell_m,
+            'height_m': rows * cell_m,
         }
         cells = np.frombuffer(message.data, np.int8)
-        png = map_png(cells.reshape(message.info.height, message.info.width))
+        png = map_png(cells.reshape(rows, columns))
         self.ledger.ground = Picture(self._pictures, png, time.monotonic(), meta)
         self._page.news()
 

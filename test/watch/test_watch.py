@@ -8,6 +8,7 @@ import http.client
 import importlib.util
 import json
 import stat
+import threading
 import time
 from pathlib import Path
 
@@ -114,6 +115,41 @@ def test_a_map_reaches_the_ledger_with_where_it_lies(bench, watch):
         'width_m': 2.0,
         'height_m': 1.0,
     }
+
+
+def test_messages_that_cannot_be_used_are_said_and_end_nothing(watch, capfd):
+    grid = OccupancyGrid()
+    grid.info.width, grid.info.height, grid.data = 4, 2, [0] * 7
+    watch._on_map(grid)
+    pose = PoseStamped()
+    pose.pose.orientation.w = 0.0  # a quaternion of length 0
+    watch._on_pose(pose)
+    watch._on_prompt(DiagnosticArray())
+    assert watch.ledger.ground is None
+    assert watch.ledger.poses == []
+    told = capfd.readouterr().err
+    assert 'a map of 4 x 2 cells with 7 values' in told
+    assert 'template' in told
+
+
+def test_an_answer_that_comes_after_the_page_gave_up_is_dropped(bench, watch):
+    asked = threading.Event()
+
+    def late(_request, response):
+        asked.wait(10.0)
+        response.success = True
+        return response
+
+    node = Node('landing')
+    node.create_service(Trigger, 'landing/engage', late)
+    bench.spin(node)
+    bench.until(watch._commands['engage'].service_is_ready)
+    answer = watch.command('engage')
+    assert answer.cancel()
+    asked.set()
+    bench.until(lambda: not watch._commands['engage']._pending_requests)
+    assert watch.failure is None
+    node.destroy_node()
 
 
 def test_a_command_reaches_the_service_and_its_sentence_comes_back(bench, watch):
