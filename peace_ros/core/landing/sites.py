@@ -137,9 +137,10 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
 
 
 def too_narrow(clearance_m: float, required_m: float) -> str:
-    """Return how much clearance is missing."""
+    """Return how much clearance is missing, rounded up to 0.1 m: what is refused misses some."""
+    missing_m = ceil(10.0 * (required_m - clearance_m) - 1e-6) / 10.0
     return (
-        f'too narrow by {required_m - clearance_m:.1f} m: {clearance_m:.1f} m of clearance, '
+        f'too narrow by {missing_m:.1f} m: {clearance_m:.1f} m of clearance, '
         f'{required_m:.1f} m are needed from this altitude'
     )
 

@@ -90,8 +90,10 @@ export function drawMap(svg, caption, state, samples, ground) {
   if (state.focus) parts.push(circle(state.focus.north_m, state.focus.east_m, state.focus.radius_m, 'mark focus'));
   state.refused.forEach((each, index) => {
     parts.push(place(`refused ${index + 1}`, words(each, 'refused'), caption,
-      circle(each.north_m, each.east_m, Math.max(each.clearance_m, 3 * unit), 'mark refused'),
-      element('text', { x: each.east_m, y: -each.north_m + 3 * unit, 'font-size': 8 * unit, 'text-anchor': 'middle' }, String(index + 1))));
+      circle(each.north_m, each.east_m, Math.max(each.clearance_m, 2 * unit), 'mark refused'),
+      // Beside a circle that is too small to hold its number.
+      element('text', { x: each.east_m + (each.clearance_m > 6 * unit ? 0 : Math.max(each.clearance_m, 2 * unit) + 3 * unit),
+        y: -each.north_m + 3 * unit, 'font-size': 8 * unit, 'text-anchor': 'middle' }, String(index + 1))));
   });
   if (state.site) {
     parts.push(place('site', words(state.site, 'site'), caption,

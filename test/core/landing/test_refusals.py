@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A person is told of the best refused places, and of the first condition that each misses."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from peace_ros.core.domain import Pose, Site
 from peace_ros.core.landing import Focus, LandingParameters
 from peace_ros.core.landing.memory import FailedPlace
 from peace_ros.core.landing.refusals import MOST_REFUSED, refused_places
-from peace_ros.core.landing.sites import Search
+from peace_ros.core.landing.sites import Search, too_narrow
 from peace_ros.core.mapping import MapLayers
 
 P = LandingParameters()
@@ -57,9 +58,14 @@ def test_says_by_how_much_a_place_is_too_narrow():
     assert (place.north_m, place.east_m) == pytest.approx((20.0, -10.0), abs=1.0)
     assert place.distance_m == pytest.approx(22.4, abs=1.0)
     assert 2.0 < place.clearance_m < 3.3
-    missing_m = 4.0 - place.clearance_m
-    assert f'too narrow by {missing_m:.1f} m' in place.reason
+    missing_m = float(re.search(r'too narrow by ([\d.]+) m', place.reason)[1])
+    assert missing_m - 0.1 < 4.0 - place.clearance_m <= missing_m + 1e-6
     assert '4.0 m are needed' in place.reason
+
+
+def test_what_is_missing_is_never_zero():
+    assert too_narrow(3.36, 3.4).startswith('too narrow by 0.1 m')
+    assert too_narrow(3.1, 4.3).startswith('too narrow by 1.2 m')
 
 
 def test_ground_narrower_than_the_vehicle_is_no_place():
