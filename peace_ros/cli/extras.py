@@ -25,6 +25,9 @@ EXTRA_OF = {
     'transformers': 'export',
     'safetensors': 'export',
     'onnx': 'export',
+    'starlette': 'watch',
+    'uvicorn': 'watch',
+    'websockets': 'watch',
 }
 """Module -> the extra of setup.cfg that installs its package."""
 PACKAGE_OF = {
@@ -36,7 +39,7 @@ PACKAGE_OF = {
 """Module -> its package on PyPI, where the names differ."""
 ROS_MODULES = frozenset(
     {'rclpy', 'launch', 'launch_ros', 'ament_index_python', 'std_srvs', 'tf2_ros', 'tf2_msgs'}
-    | {f'{name}_msgs' for name in ('sensor', 'std', 'geometry', 'diagnostic', 'rosgraph')}
+    | {f'{name}_msgs' for name in ('sensor', 'std', 'geometry', 'diagnostic', 'nav', 'rosgraph')}
     | {f'{name}_interfaces' for name in ('rcl', 'builtin')}
 )
 

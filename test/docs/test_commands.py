@@ -175,7 +175,8 @@ def _check_peace(words: tuple[str, ...]) -> None:
 
 def _check_ros(words: tuple[str, ...]) -> None:
     if words[1:3] == ('run', 'peace_ros') and words[3] != 'peace':
-        executables = {name: (name,) for name in (*FLYING_NODES, RECORDER, *SIMULATOR_NODES)}
+        names = (*FLYING_NODES, RECORDER, *SIMULATOR_NODES, 'watch')
+        executables = {name: (name,) for name in names}
         executables['perception'] = ('prompt_generator', 'segmentation')
         assert words[3] in executables
         known = {key for node in executables[words[3]] for key in named(NODE_PARAMETERS[node])}
