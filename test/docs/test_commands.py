@@ -81,7 +81,7 @@ NOT_RUN = {
     'git': 'a download',
     './build.sh': 'builds ONNX Runtime, on a Jetson',
     'rosdep': 'needs the index of ROS; test_package_xml.py checks the keys',
-    'colcon': 'test_colcon.py builds the package',
+    'colcon': 'builds in a workspace; .ci/ubuntu-24.04 colcon does it',
     'mkdocs': 'test_pages.py builds the site',
     'cd': 'changes the folder',
     'source': 'changes the shell',
