@@ -303,6 +303,14 @@ def test_no_excuse_is_left_over() -> None:
     assert set(NOT_RUN.values()) == used
 
 
+@pytest.mark.parametrize('reason', NOT_RUN.values())
+def test_a_test_that_an_excuse_names_exists(reason: str) -> None:
+    for name in re.findall(r'test_\w+\.py', reason):
+        assert list((ROOT / 'test').rglob(name)), name
+    for name in re.findall(r'test/[\w/]+', reason):
+        assert (ROOT / name).exists(), name
+
+
 def test_impossible_commands_are_found() -> None:
     for words in (('fly',), ('demo', '--altitude'), ('models', 'burn'), ('demo', '--config', 'x')):
         with pytest.raises(AssertionError):
