@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The three nodes on board: ``ros2 launch peace_ros landing.launch.py mavlink:=URL``.
+"""The nodes on board: ``ros2 launch peace_ros landing.launch.py mavlink:=URL``.
 
 ``--show-args`` lists the arguments. Nothing moves before
 ``ros2 service call /landing/engage std_srvs/srv/Trigger``.
@@ -25,13 +25,15 @@ PACKAGE = 'peace_ros'
 PRESETS = sorted(path.stem for path in (config_dir() / 'presets').glob('*.yaml'))
 DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 COMPOSED, SEPARATE = 'perception', ('prompt_generator', 'segmentation')
+RECORDER = 'recorder'
 FAST_DDS = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 RESPAWN_DELAY_S = 2.0
 BOOLEANS = ['true', 'false', 'True', 'False']  # both are in use for launch files
 
 OF_ALL_NODES = ('use_sim_time', 'autostart')
-"""Arguments that are parameters of the nodes."""
+"""Arguments that are parameters of the nodes, apart from the recorder."""
 OF_PERCEPTION = ('image_transport',)
+OF_RECORDER = ('use_sim_time', 'recordings', *OF_PERCEPTION)
 OF_LANDING = (
     'interface',
     'mavlink',
@@ -58,6 +60,8 @@ ARGUMENTS: tuple[tuple[str, Any, str, list[str] | None], ...] = (
     ('autostart', 'true', 'Configure and activate the nodes; else a lifecycle manager', BOOLEANS),
     ('use_composition', 'false', 'Prompt generator and segmentation in one process', BOOLEANS),
     ('use_respawn', 'false', 'Start a perception node again when it has ended', BOOLEANS),
+    ('record', 'true', 'Record what a replay needs, in a process of its own', BOOLEANS),
+    ('recordings', '', f'Folder of the recordings{_UNSET}', None),
     (
         'discovery_range',
         EnvironmentVariable(DISCOVERY, default_value='LOCALHOST'),
@@ -114,11 +118,7 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
     calibration = [(beside, given['camera_info'])] if given['camera_info'] else []
 
     def create(name: str, arguments: tuple[str, ...], *, respawn: bool) -> Node:
-        chosen = {
-            each: is_true.get(each, given[each])
-            for each in (*OF_ALL_NODES, *arguments)
-            if given[each]
-        }
+        chosen = {each: is_true.get(each, given[each]) for each in arguments if given[each]}
         return Node(
             package=PACKAGE,
             executable=name,
@@ -141,18 +141,20 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
             },
         )
 
+    respawn = is_true['use_respawn']
     return [
         *(
-            create(name, OF_PERCEPTION, respawn=is_true['use_respawn'])
+            create(name, (*OF_ALL_NODES, *OF_PERCEPTION), respawn=respawn)
             for name in ((COMPOSED,) if is_true['use_composition'] else SEPARATE)
         ),
         # Never again by itself: where it engages automatically, it would after a takeover, too.
-        create('landing', OF_LANDING, respawn=False),
+        create('landing', (*OF_ALL_NODES, *OF_LANDING), respawn=False),
+        *([create(RECORDER, OF_RECORDER, respawn=respawn)] if is_true['record'] else []),
     ]
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the arguments and the three nodes with the parameters of the preset."""
+    """Return the arguments and the nodes with the parameters of the preset."""
     return LaunchDescription(
         [
             *(

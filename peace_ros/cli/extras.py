@@ -13,11 +13,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 EXTRA_OF = {
-    'rosbags': 'simulation',
-    'mcap': 'simulation',
-    'zstandard': 'simulation',
     'rasterio': 'geo',
     'jinja2': 'lab',
+    'psutil': 'lab',
     'matplotlib': 'simulation',
     'pyarrow': 'experiment',
     'scipy': 'experiment',

@@ -94,7 +94,7 @@ def test_each_module_of_others_is_installed_by_something_that_a_sentence_names()
 @pytest.mark.parametrize(
     ('module', 'command'),
     [
-        ('rosbags.serde', 'pip install ".[simulation]" in the checkout'),
+        ('matplotlib.pyplot', 'pip install ".[simulation]" in the checkout'),
         ('PIL', 'the package pillow is not installed: run pip install pillow'),
         ('cv2', 'the package opencv-python-headless is not installed: run pip install opencv-'),
         ('std_srvs.srv', 'source the setup file of ROS 2 Jazzy (on x86_64 without ROS: run pip'),
@@ -126,7 +126,7 @@ def test_where_the_system_manages_python_the_command_has_the_option_that_pip_wan
     monkeypatch.setattr(sysconfig, 'get_path', lambda _name: str(tmp_path))
     monkeypatch.setattr(sys, 'base_prefix', '/usr')
     monkeypatch.setattr(sys, 'prefix', '/venv' if in_venv else '/usr')
-    for module, what in (('tokenizers', 'tokenizers'), ('rosbags', '".[simulation]"')):
+    for module, what in (('tokenizers', 'tokenizers'), ('rasterio', '".[geo]"')):
         sentence = how_to_install(ModuleNotFoundError(name=module))
         assert f'pip install {"--break-system-packages " * option}{what}' in sentence
 
@@ -146,10 +146,10 @@ def test_what_is_required_is_looked_for_in_order() -> None:
 @pytest.mark.parametrize(
     ('words', 'modules', 'extra'),
     [
-        ('demo', 'rosbags', 'simulation'),
+        ('demo', 'matplotlib', 'simulation'),
         ('demo', 'rclpy', 'wheels'),
-        ('replay no.mcap', 'rosbags', 'simulation'),
-        ('faults', 'rosbags', 'simulation'),
+        ('replay no.mcap', 'matplotlib', 'simulation'),
+        ('faults', 'matplotlib', 'simulation'),
         ('models export no', 'torch', 'export'),
         ('models export no.onnx --clip clip-small', 'onnx', 'export'),
         ('benchmark --reference --quick', 'torch', 'export'),

@@ -32,6 +32,7 @@ KEY_OF = {
     'matplotlib': 'python3-matplotlib',
     'rasterio': 'python3-rasterio',
     'jinja2': 'python3-jinja2',
+    'psutil': 'python3-psutil',
     'pytest': 'python3-pytest',
     'pytest-xdist': 'python3-pytest-xdist',
     'hypothesis': 'python3-hypothesis',
