@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How long each node on board takes from its start to ready, and from SIGINT to its exit.
 
-Ready is the log line of a node that is active. The nodes get camera frames meanwhile, and the
-signal comes a second after ready, so that the networks are at work.
+Ready is the log line of a node that is active, of the recorder that it records. The nodes get
+camera frames meanwhile, and the signal comes a second after ready: the networks are at work.
 
 python -m peace_ros.lab.benchmark.start_stop --times 20
 """
@@ -16,6 +16,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -29,6 +30,7 @@ import rclpy
 from rclpy.node import Node
 from sensor_msgs.msg import Image
 
+from peace_ros.core.node_parameters import RECORDER
 from peace_ros.core.presets import load_preset
 from peace_ros.core.resources import config_dir
 from peace_ros.nodes.messages import image_message
@@ -40,6 +42,7 @@ READY = {
     'segmentation': ('ready: ',),
     'perception': (r'\[prompt_generator\]: ready: ', r'\[segmentation\]: ready: '),
     'landing': ('waiting for the vehicle: ',),
+    RECORDER: ('recording into ',),
 }
 """Node -> what its log says, in any order, once it works."""
 READY_LIMIT_S, EXIT_LIMIT_S = 3.0, 2.0
@@ -66,17 +69,21 @@ def measure(node: str, preset: str = 'peace_cs') -> Lifetime:
     Raises:
         RuntimeError: it ended before it was ready, or was not ready within 60 s.
     """
-    # Port 0: any that is free. No autopilot answers, so the node keeps looking for one.
-    vehicle = {'mavlink': 'udpin:127.0.0.1:0'} if node == 'landing' else {}
-    command = [sys.executable, '-m', f'peace_ros.nodes.{node}']
+    room = 'recorder' if node == RECORDER else 'nodes'
     began_s = time.monotonic()
-    with subprocess.Popen(
-        [*command, *ros_arguments(vehicle, load_preset(preset).path)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        start_new_session=True,
-    ) as process:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        subprocess.Popen(
+            [
+                *(sys.executable, '-m', f'peace_ros.{room}.{node}'),
+                *ros_arguments(_own_parameters(node, folder), load_preset(preset).path),
+            ],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        ) as process,
+    ):
         overdue = threading.Timer(_GIVE_UP_S, process.kill)
         overdue.start()
         try:
@@ -90,6 +97,13 @@ def measure(node: str, preset: str = 'peace_cs') -> Lifetime:
         finally:
             overdue.cancel()
             process.kill()
+
+
+def _own_parameters(node: str, folder: str) -> dict[str, object]:
+    if node == 'landing':
+        # Port 0: any that is free. No autopilot answers, so the node keeps looking for one.
+        return {'mavlink': 'udpin:127.0.0.1:0'}
+    return {'recordings': folder} if node == RECORDER else {}
 
 
 def _read_until_ready(process: subprocess.Popen[str], node: str) -> None:

@@ -8,17 +8,18 @@ import time
 
 import pytest
 
-from peace_ros.core.node_parameters import FLYING_NODES
+from peace_ros.core.node_parameters import FLYING_NODES, RECORDER
 from peace_ros.lab.benchmark import start_stop
 from peace_ros.lab.benchmark.start_stop import Lifetime
 
 
 def test_every_node_on_board_is_measured():
-    assert set(start_stop.READY) == {*FLYING_NODES, 'perception'}
+    assert set(start_stop.READY) == {*FLYING_NODES, 'perception', RECORDER}
 
 
-def test_a_node_that_works_is_measured_until_its_end():
-    life = start_stop.measure('landing')
+@pytest.mark.parametrize('node', ['landing', RECORDER])
+def test_a_node_that_works_is_measured_until_its_end(node):
+    life = start_stop.measure(node)
     assert life.status == 0
     assert 0.1 < life.ready_s < 60.0
     assert 0.0 < life.exit_s < 60.0
