@@ -140,7 +140,7 @@ class _VehicleState:
 
 
 @dataclass(frozen=True)
-class _Picture:
+class _SeenPicture:
     """A picture and what is known at its stamp."""
 
     grey: NDArray[np.uint8]
@@ -300,7 +300,7 @@ class VisualInertialOdometry:
 
     def _viewed(
         self, frame: Frame, state: _VehicleState, altitude_agl_m: float, rates_rad_s: Array
-    ) -> _Picture | Doubt:
+    ) -> _SeenPicture | Doubt:
         """Return the picture of a frame with what is known at its stamp."""
         height_m = altitude_agl_m - self._offset_m(state.quaternion)[2]
         if not (isfinite(height_m) and height_m >= _LOWEST_M):
@@ -313,14 +313,14 @@ class VisualInertialOdometry:
         mount = ground_to_camera(camera, camera_pose(Mount(self._mount.quaternion), _ONE_ABOVE))
         readout_s = self._p.row_time_s * frame.image_rgb.shape[0]
         readout = Readout(readout_s, mount @ rates_rad_s, state.velocity_m_s / height_m)
-        return _Picture(grey, camera, mount, height_m, readout)
+        return _SeenPicture(grey, camera, mount, height_m, readout)
 
     def _offset_m(self, quaternion: Quaternion) -> Array:
         """Return where the camera is: metres north, east, down of the vehicle."""
         return np.asarray(rotation_matrix(quaternion) @ np.array(self._mount.offset_frd_m))
 
     def _begin_key(
-        self, picture: _Picture, state: _VehicleState, fewest: int = _FEWEST
+        self, picture: _SeenPicture, state: _VehicleState, fewest: int = _FEWEST
     ) -> Doubt | None:
         """Make a picture the key frame; if it has too few corners the old one stays."""
         frame = build_keyframe(
@@ -335,7 +335,7 @@ class VisualInertialOdometry:
         self._state = replace(state, solved_ns=state.stamp_ns)
         return None
 
-    def _begin_again(self, picture: _Picture, state: _VehicleState) -> Doubt | None:
+    def _begin_again(self, picture: _SeenPicture, state: _VehicleState) -> Doubt | None:
         """Continue with a new key frame where the vehicle is believed to be."""
         grown = np.eye(3) * (0.5 * _LOST_M_S2 * state.lost_s**2) ** 2
         problem = self._begin_key(
@@ -360,7 +360,7 @@ class VisualInertialOdometry:
         return self._check.doubts
 
     def _against(
-        self, key: _Key, picture: _Picture, state: _VehicleState
+        self, key: _Key, picture: _SeenPicture, state: _VehicleState
     ) -> tuple[Solution, Matches] | Doubt:
         """Return where the camera is against a key frame."""
         if len(key.frame.ground) < _FEWEST:
@@ -398,7 +398,7 @@ class VisualInertialOdometry:
     def _take(
         self,
         key: _Key,
-        picture: _Picture,
+        picture: _SeenPicture,
         predicted: _VehicleState,
         solution: Solution,
         matches: Matches,
