@@ -179,6 +179,11 @@ class LandingOptions(ParameterSet):
         choices=('parameters', 'tf'),
     )
 
+    @property
+    def takes_pose_topic(self) -> bool:
+        """Whether the pose of the vehicle comes over the topic ``pose``."""
+        return self.interface == 'twist' and self.pose_source == 'topic'
+
 
 def groups_of(node: str) -> tuple[Group, ...]:
     """Return the groups of parameters of one of :data:`FLYING_NODES`.

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How nodes subscribe to images, and what the landing node hears."""
+"""What the landing node hears: callbacks only store."""
 
 from __future__ import annotations
 
@@ -10,55 +10,27 @@ from functools import partial
 from importlib import import_module
 from typing import Any
 
-from rclpy.node import Node
-from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, Image
 
-from peace_ros.core.domain import ConfigurationError, Frame, PeaceError
+from peace_ros.core.domain import ConfigurationError, PeaceError
 from peace_ros.core.landing import LandingCore
 from peace_ros.core.messages import (
-    camera_info_topic,
     depth_from_image,
     frame_from_message,
     heatmap_from_image,
-    is_rectified,
     stamp_ns_of,
 )
 from peace_ros.core.node_parameters import LandingOptions
 from peace_ros.core.transforms import StaticTransforms
+from peace_ros.nodes.images import FRAME_INFO, ImageMessage, subscribe_images
 from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import IMAGE_IN, LATCHED_IN, RESULT
+from peace_ros.nodes.sources import Sources
 
-FRAME_INFO = 'heatmap/frame_info'
-"""CameraInfo of the frame that the heatmap of this stamp covers: its size is that of the frame, and
-K is 0 where the frame is not calibrated."""
 _WAITING = 4
 """Messages that are kept until the next step; older ones are dropped."""
 _FRAME_INFOS = 64
 """They may come before their heatmap, which is larger."""
-
-ImageMessage = Any
-"""An Image or a CompressedImage; rclpy's messages have no types to check."""
-
-
-def subscribe_images(node: Node, transport: str, callback: Callable[[ImageMessage], None]) -> str:
-    """Subscribe to ``image`` (transport raw) or its ``/compressed``; return the name of ``image``.
-
-    As with image_transport, ``image`` is the name that is remapped, whatever the transport. The
-    reliability may be overridden by the ROS parameters ``qos_overrides.<topic>...``.
-    """
-    base: str = node.resolve_topic_name('image')
-    kind, topic = (
-        (CompressedImage, f'{base}/compressed') if transport == 'compressed' else (Image, base)
-    )
-    node.create_subscription(
-        kind,
-        topic,
-        callback,
-        IMAGE_IN,
-        qos_overriding_options=QoSOverridingOptions.with_default_policies(),
-    )
-    return base
 
 
 def tf_message(parameter: str) -> Any:
@@ -76,32 +48,6 @@ def tf_message(parameter: str) -> Any:
         ) from error
 
 
-class CalibratedImages:
-    """Images, and the ``camera_info`` beside them: its newest message is that of each image.
-
-    Args:
-        node: Subscribes.
-        transport: As for :func:`subscribe_images`.
-        callback: Gets each image message.
-    """
-
-    def __init__(
-        self, node: Node, transport: str, callback: Callable[[ImageMessage], None]
-    ) -> None:
-        self._info: CameraInfo | None = None
-        self._topic = subscribe_images(node, transport, callback)
-        node.create_subscription(
-            CameraInfo, camera_info_topic(self._topic), self._on_info, IMAGE_IN
-        )
-
-    def _on_info(self, message: CameraInfo) -> None:
-        self._info = message
-
-    def frame(self, message: ImageMessage) -> Frame:
-        """Return the frame of an image, with its camera; PeaceError says what is wrong."""
-        return frame_from_message(message, self._info, rectified=is_rectified(self._topic))
-
-
 class LandingInputs:
     """Heatmaps, and where they are given depth images and pictures: callbacks only store.
 
@@ -115,12 +61,15 @@ class LandingInputs:
 
     def __init__(self, node: PeaceNode, options: LandingOptions) -> None:
         self._node = node
+        self.sources = Sources(node, poses=options.takes_pose_topic)
+        """Whose data arrive: none is used while a topic has several publishers."""
         self._heatmaps: deque[Image] = deque(maxlen=_WAITING)
         self._frame_infos: deque[CameraInfo] = deque(maxlen=_FRAME_INFOS)
         self._depths: deque[Image] = deque(maxlen=_WAITING)
         self._images: deque[ImageMessage] = deque(maxlen=_WAITING)
         self._heatmap_arrived = node.diagnostics.watch('heatmap')
         node.create_subscription(Image, 'heatmap', self._on_heatmap, IMAGE_IN)
+        self._frame_info_arrived = node.diagnostics.watch(FRAME_INFO)
         node.create_subscription(CameraInfo, FRAME_INFO, self._on_frame_info, RESULT)
         node.create_subscription(Image, 'depth', self._on_depth, IMAGE_IN)
         self._vehicle = options.tf_child
@@ -136,6 +85,7 @@ class LandingInputs:
         self._heatmaps.append(message)
 
     def _on_frame_info(self, message: CameraInfo) -> None:
+        self._frame_info_arrived(stamp_ns_of(message))
         self._frame_infos.append(message)
 
     def _on_depth(self, message: Image) -> None:
@@ -146,6 +96,7 @@ class LandingInputs:
 
     def feed(self, core: LandingCore) -> None:
         """Hand on what has come since the last call; what cannot be read is said and dropped."""
+        core.distrust(self.sources.problem)
         inputs: tuple[tuple[str, deque[Any], Callable[[Any], None]], ...] = (
             ('image', self._images, lambda each: core.add_view(frame_from_message(each))),
             ('depth', self._depths, lambda each: core.add_depth(depth_from_image(each))),

@@ -25,7 +25,6 @@ from peace_ros.core.mapping import MapParameters
 from peace_ros.core.node_parameters import CameraOptions, LandingOptions, groups_of
 from peace_ros.core.vehicle import VehicleParameters
 from peace_ros.nodes.connection import newest_telemetry
-from peace_ros.nodes.diagnostics import several_publishers
 from peace_ros.nodes.engagement import EngagementServices
 from peace_ros.nodes.inputs import LandingInputs
 from peace_ros.nodes.managed import ManagedNode
@@ -130,7 +129,7 @@ class LandingNode(ManagedNode):
             map_age_s = self._core.map_age_s(self.clock_ns())
             return (
                 self.diagnostics.inactive
-                or several_publishers(self)
+                or self._inputs.sources.engagement_problem
                 or self._access.vehicle_problem
                 or engagement_problem(
                     self._state, told, age_s, map_age_s, self._landing, self._core.last_rejection
@@ -138,7 +137,8 @@ class LandingNode(ManagedNode):
             )
 
     def _readiness(self) -> Health:
-        return readiness(self._state, several_publishers(self), self.check_engagement())
+        several = self._inputs.sources.engagement_problem
+        return readiness(self._state, several, self.check_engagement())
 
     def begin(self) -> str:
         """Begin the landing of a vehicle that obeys; return what speaks against it, or nothing."""

@@ -17,7 +17,7 @@ from peace_ros.core.messages import stamp_ns_of
 from peace_ros.core.node_parameters import PromptGeneratorOptions, groups_of
 from peace_ros.core.pipeline import create_generator
 from peace_ros.core.prompting import PromptGenerator, PromptingParameters, resolve_template
-from peace_ros.nodes.inputs import ImageMessage, subscribe_images
+from peace_ros.nodes.images import ImageMessage, subscribe_images
 from peace_ros.nodes.managed import ManagedNode
 from peace_ros.nodes.messages import prompt_to_message
 from peace_ros.nodes.qos import RESULT

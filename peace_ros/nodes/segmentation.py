@@ -24,7 +24,7 @@ from peace_ros.core.segmentation import (
     family_of,
     load_terms,
 )
-from peace_ros.nodes.inputs import FRAME_INFO, CalibratedImages, ImageMessage
+from peace_ros.nodes.images import FRAME_INFO, CalibratedImages, ImageMessage
 from peace_ros.nodes.managed import ManagedNode
 from peace_ros.nodes.messages import camera_info, heatmap_to_image, jpeg_message
 from peace_ros.nodes.prompts import PromptInput, prompt_of_another_frame, static_prompt

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain import Pose, VehicleError
 from peace_ros.core.landing import Decision, State
-from peace_ros.core.messages import pose_from_message, pose_from_transform
+from peace_ros.core.messages import pose_from_message, pose_from_transform, stamp_ns_of
 from peace_ros.core.node_parameters import LandingOptions
 from peace_ros.core.vehicle import VehicleLink, VehicleParameters, check_access, open_vehicle
 from peace_ros.nodes.connection import Connection
@@ -164,6 +164,7 @@ class VehicleAccess:
 
     def _subscribe_pose(self, options: LandingOptions) -> None:
         if options.pose_source == 'topic':
+            self._pose_arrived = self._node.diagnostics.watch('pose')
             self._node.create_subscription(PoseStamped, 'pose', self._on_pose, POSE_IN)
             return
 
@@ -176,6 +177,7 @@ class VehicleAccess:
         self._node.create_subscription(tf_message('pose_source'), '/tf', on_tf, POSE_IN)
 
     def _on_pose(self, message: PoseStamped) -> None:
+        self._pose_arrived(stamp_ns_of(message))
         self._take(pose_from_message, message)
 
     def _take(self, read: Callable[[Any], Pose], message: Any) -> None:

@@ -113,6 +113,10 @@ class LandingCore:
         """Count a heatmap that cannot be used, and remember why."""
         self._intake.reject(reason)
 
+    def distrust(self, reason: str) -> None:
+        """Hold, drop the map and use no input while there is a reason; empty: use them again."""
+        self._intake.distrust(reason)
+
     def add_depth(self, depth: DepthImage) -> None:
         """Close ground that a depth image shows not flat; optional, and it opens nothing."""
         self._intake.add_depth(depth)
@@ -154,7 +158,13 @@ class LandingCore:
             over_site=self._is_over_site(pose, sighting),
         )
         decision = self._helm.decide(
-            now_ns, telemetry, telemetry_age_s, sighting, self._intake.last_rejection, heights
+            now_ns,
+            telemetry,
+            telemetry_age_s,
+            sighting,
+            self._intake.last_rejection,
+            heights,
+            self._intake.distrusted,
         )
         if decision.state is not before and self._lookout.follow(before, decision.state, now_ns):
             self._helm.fail_attempt()

@@ -58,6 +58,8 @@ class HeatmapIntake:
         self.counts: Counter[str] = Counter()
         """Heatmaps by result: `used`, or the reason of a rejection."""
         self._last_rejection = self._drop_reason = ''
+        self.distrusted = ''
+        """Why nothing that comes is used now, empty when it is."""
         self.drops = 0
         """How often the map was dropped; a site chosen from it is no longer valid then."""
 
@@ -88,9 +90,16 @@ class HeatmapIntake:
             self._carrier.clear()
             self._drop_map('the camera is mounted otherwise')
 
+    def distrust(self, reason: str) -> None:
+        """Drop the map and use nothing that comes while there is a reason; empty: use it again."""
+        self.distrusted = reason
+        if reason:
+            self.clear()
+            self._drop_map(reason)
+
     def add_pose(self, pose: Pose) -> None:
         """Keep a pose, north and east NaN where unknown, and use the heatmaps that wait for it."""
-        if self._mount is None:
+        if self._mount is None or self.distrusted:
             return
         pose = camera_pose(self._mount, pose)
         if not pose.has_position:
@@ -134,7 +143,9 @@ class HeatmapIntake:
     def add_heatmap(self, heatmap: Heatmap) -> None:
         """Use a heatmap, let it wait for its pose, or reject it."""
         newest_ns = self._pending[-1].stamp_ns if self._pending else self._map.stamp_ns
-        if self._mount is None:
+        if self.distrusted:
+            self.reject(self.distrusted)
+        elif self._mount is None:
             self.reject(_NO_MOUNT)
         elif not np.isfinite(heatmap.safety).all():
             self.reject('not finite')

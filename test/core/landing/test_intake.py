@@ -301,6 +301,23 @@ def test_pictures_and_depth_of_another_shape_are_counted_and_not_used(intake):
     assert intake.counts['depth of another shape than the frames'] == 1
 
 
+def test_inputs_of_unknown_sources_are_not_used_and_those_of_before_dropped(intake, safety_map):
+    intake.distrust('two of them')
+    assert safety_map.stamp_ns is None
+    assert intake.drops == 1
+    for tick in (21, 22):
+        intake.add_pose(pose_of(0.1 * tick))
+        intake.add_heatmap(heatmap_of(0.1 * tick))
+    assert safety_map.stamp_ns is None
+    assert intake.counts['two of them'] == 2
+    intake.distrust('')
+    for tick in (23, 24):
+        intake.add_pose(pose_of(0.1 * tick))
+        intake.add_heatmap(heatmap_of(0.1 * tick))
+    assert safety_map.stamp_ns == round(2.4 * S)
+    assert intake.last_rejection == 'two of them'
+
+
 def test_reasons_without_end_do_not_fill_the_memory(intake):
     for number in range(1000):
         intake.reject(f'the frames have {number} px')
