@@ -18,7 +18,6 @@ from peace_ros.core.landing import (
     LandingCore,
     LandingParameters,
     State,
-    engagement_problem,
     readiness,
 )
 from peace_ros.core.mapping import MapParameters
@@ -76,9 +75,10 @@ class LandingNode(ManagedNode):
         self.end_landing()
 
     def _create_core(self) -> LandingCore:
-        camera = self.filled(CameraOptions)
+        camera, maps = self.filled(CameraOptions), self.filled(MapParameters)
         mount = None if self._options.mount_source == 'tf' else camera.mount
-        return LandingCore(self._landing, camera.camera, self.filled(MapParameters), mount)
+        on_gimbal = self.filled(VehicleParameters).follow_gimbal
+        return LandingCore(self._landing, camera.camera, maps, mount, on_gimbal=on_gimbal)
 
     def change(self, filled: Mapping[type[Any], Any]) -> None:
         """Begin a new map with other thresholds; only while no landing is under way."""
@@ -126,14 +126,11 @@ class LandingNode(ManagedNode):
         """Return why a landing cannot begin now, empty when it can."""
         told, age_s = newest_telemetry(self._access.link)
         with self._lock:
-            map_age_s = self._core.map_age_s(self.clock_ns())
             return (
                 self.diagnostics.inactive
                 or self._inputs.sources.engagement_problem
                 or self._access.vehicle_problem
-                or engagement_problem(
-                    self._state, told, age_s, map_age_s, self._landing, self._core.last_rejection
-                )
+                or self._core.engagement_problem(self.clock_ns(), told, age_s)
             )
 
     def _readiness(self) -> Health:

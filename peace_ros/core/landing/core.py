@@ -23,6 +23,7 @@ from peace_ros.core.domain import (
     Telemetry,
 )
 from peace_ros.core.landing.decision import Decision
+from peace_ros.core.landing.engagement import engagement_problem
 from peace_ros.core.landing.guidance import over_site
 from peace_ros.core.landing.heights import HeightWatch
 from peace_ros.core.landing.helm import Helm
@@ -54,6 +55,8 @@ class LandingCore:
         camera: Camera,
         map_parameters: MapParameters | None = None,
         mount: Mount | None = NADIR,
+        *,
+        on_gimbal: bool = False,
     ) -> None:
         """Begin in IDLE.
 
@@ -62,10 +65,13 @@ class LandingCore:
             camera: For frames that come without a calibration of their own.
             map_parameters: Of the map.
             mount: How the camera sits on the vehicle; None until :meth:`place_camera` says it.
+            on_gimbal: The camera sits on a gimbal, which telemetry reports, and on it as ``mount``.
         """
         self.parameters = parameters
         self.safety_map = SafetyMap(map_parameters)
-        self._intake = HeatmapIntake(parameters, camera, self.safety_map, mount)
+        self._intake = HeatmapIntake(
+            parameters, camera, self.safety_map, mount, on_gimbal=on_gimbal
+        )
         self._lookout = Lookout(parameters, self.safety_map)
         self._heights = HeightWatch(parameters)
         self._helm = Helm(parameters)
@@ -132,6 +138,19 @@ class LandingCore:
         self._intake.picture_height.begin()
         self._helm.engage()
 
+    def engagement_problem(
+        self, now_ns: int, telemetry: Telemetry | None, telemetry_age_s: float
+    ) -> str:
+        """Return why a landing cannot begin now, empty when it can; as for :meth:`step`."""
+        return self._intake.distrusted or engagement_problem(
+            self.state,
+            telemetry,
+            telemetry_age_s,
+            self.map_age_s(now_ns),
+            self.parameters,
+            self.last_rejection,
+        )
+
     def disengage(self) -> None:
         """Stop: zero velocity and IDLE from the next step on."""
         self._helm.disengage()
@@ -145,6 +164,7 @@ class LandingCore:
             telemetry_age_s: Since it was received, by a steady clock.
         """
         self._keep_time(now_ns)
+        self._intake.follow_gimbal(None if telemetry is None else telemetry.gimbal)
         self._intake.tick(now_ns)
         if self._intake.drops != self._drops:
             self._drops = self._intake.drops

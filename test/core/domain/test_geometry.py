@@ -14,6 +14,7 @@ from peace_ros.core.domain.geometry import (
     attitude_enu_flu_to_ned_frd,
     attitude_ned_frd_to_enu_flu,
     camera_pose,
+    camera_pose_on_gimbal,
     enu_to_ned,
     footprint_m,
     ground_to_image,
@@ -174,6 +175,31 @@ def test_the_place_of_the_camera_turns_with_the_vehicle() -> None:
     east = camera_pose(mount, pose(yaw=radians(90)))
     assert (east.north_m, east.east_m) == pytest.approx((-1.0, 2.0))
     assert (east.down_m, east.altitude_agl_m) == pytest.approx((-99.5, 99.5))
+
+
+@pytest.mark.parametrize('in_earth', [False, True])
+def test_a_camera_on_a_gimbal_looks_where_the_gimbal_points_however_the_vehicle_leans(
+    in_earth: bool,
+) -> None:
+    leaning = pose(roll=0.2, pitch=-0.3, yaw=radians(90))
+    turned = quaternion_from_euler(0.0, radians(-75.0), radians(90) if in_earth else 0.0)
+    seen = centre_looks_at(camera_pose_on_gimbal(NADIR, leaning, turned, in_earth=in_earth))
+    assert seen == pytest.approx((0.0, 100 * tan(radians(15))), abs=1e-6)
+
+
+def test_a_gimbal_that_points_down_is_a_nadir_camera() -> None:
+    down = quaternion_from_euler(0.0, radians(-90.0), 0.0)
+    placed = camera_pose_on_gimbal(NADIR, pose(yaw=0.7), down, in_earth=False)
+    assert pixel_of(12.0, -5.0, placed) == pytest.approx(pixel_of(12.0, -5.0, pose(yaw=0.7)))
+
+
+def test_a_camera_is_turned_on_its_gimbal_and_its_place_is_on_the_vehicle() -> None:
+    mount = mount_from_degrees((0.0, 15.0, 0.0), (2.0, 0.0, 0.5))
+    down = quaternion_from_euler(0.0, radians(-90.0), 0.0)
+    placed = camera_pose_on_gimbal(mount, pose(), down, in_earth=False)
+    assert (placed.north_m, placed.down_m) == pytest.approx((2.0, -99.5))
+    north, east = centre_looks_at(placed)
+    assert (north, east) == pytest.approx((2.0 + 99.5 * tan(radians(15)), 0.0), abs=1e-6)
 
 
 def test_the_mount_by_parameters_and_by_an_optical_frame_are_the_same() -> None:
