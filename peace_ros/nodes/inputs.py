@@ -5,14 +5,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from importlib import import_module
 from typing import Any
 
 from sensor_msgs.msg import CameraInfo, Image
 
-from peace_ros.core.domain import ConfigurationError, PeaceError
+from peace_ros.core.domain import ConfigurationError, PeaceError, Pose
 from peace_ros.core.landing import LandingCore
 from peace_ros.core.messages import (
     depth_from_image,
@@ -21,31 +20,17 @@ from peace_ros.core.messages import (
     stamp_ns_of,
 )
 from peace_ros.core.node_parameters import LandingOptions
-from peace_ros.core.transforms import StaticTransforms
+from peace_ros.core.vehicle import VehicleParameters
 from peace_ros.nodes.images import FRAME_INFO, ImageMessage, subscribe_images
 from peace_ros.nodes.node import PeaceNode
-from peace_ros.nodes.qos import IMAGE_IN, LATCHED_IN, RESULT
+from peace_ros.nodes.qos import IMAGE_IN, RESULT
 from peace_ros.nodes.sources import Sources
+from peace_ros.nodes.tf import TfMounts
 
 _WAITING = 4
 """Messages that are kept until the next step; older ones are dropped."""
 _FRAME_INFOS = 64
 """They may come before their heatmap, which is larger."""
-
-
-def tf_message(parameter: str) -> Any:
-    """Return the message type of tf, which a parameter asks for.
-
-    Raises:
-        ConfigurationError: it is not installed.
-    """
-    try:
-        return import_module('tf2_msgs.msg').TFMessage
-    except ImportError as error:
-        raise ConfigurationError(
-            f'parameter {parameter} = tf needs the package tf2_msgs: install it with ROS, or leave '
-            f'{parameter} as it is by default'
-        ) from error
 
 
 class LandingInputs:
@@ -72,11 +57,16 @@ class LandingInputs:
         self._frame_info_arrived = node.diagnostics.watch(FRAME_INFO)
         node.create_subscription(CameraInfo, FRAME_INFO, self._on_frame_info, RESULT)
         node.create_subscription(Image, 'depth', self._on_depth, IMAGE_IN)
-        self._vehicle = options.tf_child
-        self._transforms = StaticTransforms() if options.mount_source == 'tf' else None
-        if self._transforms is not None:
-            kind = tf_message('mount_source')
-            node.create_subscription(kind, '/tf_static', self._transforms.add, LATCHED_IN)
+        self.camera_frame = ''
+        """The frame_id of the newest frame that has a heatmap, empty before."""
+        self._mounts: TfMounts | None = None
+        if options.mount_source == 'tf':
+            if node.filled(VehicleParameters).follow_gimbal:
+                raise ConfigurationError(
+                    'mount_source tf and vehicle.follow_gimbal both say how the camera is turned: '
+                    'choose one of them'
+                )
+            self._mounts = TfMounts(node, options.tf_child)
         if options.registration:
             subscribe_images(node, options.image_transport, self._on_image)
 
@@ -94,9 +84,22 @@ class LandingInputs:
     def _on_image(self, message: ImageMessage) -> None:
         self._images.append(message)
 
-    def feed(self, core: LandingCore) -> None:
-        """Hand on what has come since the last call; what cannot be read is said and dropped."""
-        core.distrust(self.sources.problem)
+    def feed(self, core: LandingCore, poses: Sequence[Pose]) -> None:
+        """Hand on what has come since the last call; what cannot be read is said and dropped.
+
+        Args:
+            core: Gets it.
+            poses: Of the vehicle, since the last call.
+        """
+        if self._mounts is None:
+            core.distrust(self.sources.problem)
+            for pose in poses:
+                core.add_pose(pose)
+        else:
+            mounted = list(self._mounts.of(poses))
+            core.distrust(self.sources.problem or self._mounts.problem)
+            for pose, mount in mounted:
+                core.add_pose(pose, mount)
         inputs: tuple[tuple[str, deque[Any], Callable[[Any], None]], ...] = (
             ('image', self._images, lambda each: core.add_view(frame_from_message(each))),
             ('depth', self._depths, lambda each: core.add_depth(depth_from_image(each))),
@@ -114,12 +117,9 @@ class LandingInputs:
         if info is None:
             core.reject_heatmap(f'no {FRAME_INFO} of its stamp says what took its frame')
             return
-        if self._transforms is not None:
-            try:
-                core.place_camera(self._transforms.mount(self._vehicle, info.header.frame_id))
-            except ConfigurationError as error:
-                core.reject_heatmap(str(error))
-                raise
+        self.camera_frame = info.header.frame_id
+        if self._mounts is not None:
+            self._mounts.see(self.camera_frame)
         core.add_heatmap(heatmap_from_image(message, info))
 
     def _frame_info_of(self, heatmap: Image) -> CameraInfo | None:

@@ -76,9 +76,8 @@ class LandingNode(ManagedNode):
 
     def _create_core(self) -> LandingCore:
         camera, maps = self.filled(CameraOptions), self.filled(MapParameters)
-        mount = None if self._options.mount_source == 'tf' else camera.mount
         on_gimbal = self.filled(VehicleParameters).follow_gimbal
-        return LandingCore(self._landing, camera.camera, maps, mount, on_gimbal=on_gimbal)
+        return LandingCore(self._landing, camera.camera, maps, camera.mount, on_gimbal=on_gimbal)
 
     def change(self, filled: Mapping[type[Any], Any]) -> None:
         """Begin a new map with other thresholds; only while no landing is under way."""
@@ -98,15 +97,14 @@ class LandingNode(ManagedNode):
         at_ns = self.clock_ns()
         with self._lock:
             link = self._access.link
-            for pose in () if link is None else link.take_poses():
-                self._core.add_pose(pose)
-            self._inputs.feed(self._core)
+            self._inputs.feed(self._core, () if link is None else link.take_poses())
             told, age_s = newest_telemetry(link)
             decision = self._core.step(at_ns, told, age_s)
             self._submit(decision)
         access, sender = self._access, self._sending.state
         situation = VehicleSituation(told, age_s, access.problem, sender, access.stage, link)
         self._publisher.publish(decision, situation, at_ns)
+        self._view.camera_frame = self._inputs.camera_frame
         self._view.show(at_ns, decision, told, self._core)
         access.follow(decision)
         self._engagement.engage_when_ready()

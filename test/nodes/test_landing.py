@@ -169,7 +169,7 @@ def test_tf_needs_the_package_that_the_wheels_lack(bench):
     try:
         import tf2_msgs  # noqa: F401
     except ImportError:
-        with pytest.raises(ConfigurationError, match='tf2_msgs'):
+        with pytest.raises(ConfigurationError, match='tf2_ros'):
             bench.run(LandingNode, interface='twist', pose_source='tf')
 
 

@@ -235,6 +235,17 @@ def mount_from_optical(rotation_flu: Quaternion, offset_flu_m: tuple[float, floa
     return Mount(_positive_w(multiply(frd_from_optical, _BODY_TO_OPTICAL)), (x, -y, -z))
 
 
+def optical_from_mount(mount: Mount) -> tuple[Quaternion, tuple[float, float, float]]:
+    """Return rotation and translation (m) of base_link to the optical frame of a mounted camera.
+
+    The inverse of :func:`mount_from_optical`.
+    """
+    optical_from_body = (_SQRT_HALF, 0.0, 0.0, _SQRT_HALF)
+    turned = multiply(_FRD_TO_FLU, multiply(mount.quaternion, optical_from_body))
+    x, y, z = mount.offset_frd_m
+    return _positive_w(turned), (x, -y, -z)
+
+
 _BODY_TO_OPTICAL: Quaternion = (_SQRT_HALF, 0.0, 0.0, -_SQRT_HALF)
 """A quarter turn about the view: from the right of the picture to the top of it."""
 

@@ -54,7 +54,7 @@ class LandingCore:
         parameters: LandingParameters,
         camera: Camera,
         map_parameters: MapParameters | None = None,
-        mount: Mount | None = NADIR,
+        mount: Mount = NADIR,
         *,
         on_gimbal: bool = False,
     ) -> None:
@@ -64,7 +64,7 @@ class LandingCore:
             parameters: Of the landing.
             camera: For frames that come without a calibration of their own.
             map_parameters: Of the map.
-            mount: How the camera sits on the vehicle; None until :meth:`place_camera` says it.
+            mount: How the camera sits on the vehicle.
             on_gimbal: The camera sits on a gimbal, which telemetry reports, and on it as ``mount``.
         """
         self.parameters = parameters
@@ -99,17 +99,23 @@ class LandingCore:
         return self._lookout.memory.seen
 
     @property
+    def search_path(self) -> tuple[tuple[float, float], ...]:
+        """Way-points (north, east) of the search while a site is looked for, else none."""
+        return self._helm.search_path
+
+    @property
     def last_rejection(self) -> str:
         """Why the newest heatmap did not reach the map, or why the map was dropped."""
         return self._intake.last_rejection
 
-    def place_camera(self, mount: Mount) -> None:
-        """Set how the camera sits on the vehicle; no heatmap is used before that is known."""
-        self._intake.place_camera(mount)
+    def add_pose(self, pose: Pose, mount: Mount | None = None) -> None:
+        """Keep a pose for the heatmaps around its stamp; in the order of stamps.
 
-    def add_pose(self, pose: Pose) -> None:
-        """Keep a pose for the heatmaps around its stamp; in the order of stamps."""
-        self._intake.add_pose(pose)
+        Args:
+            pose: Of the vehicle.
+            mount: Of the camera at that moment, where it moves.
+        """
+        self._intake.add_pose(pose, mount)
 
     def add_heatmap(self, heatmap: Heatmap) -> None:
         """Put a heatmap into the map with the pose at its stamp, or count the reason why not."""

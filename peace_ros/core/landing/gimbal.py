@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 
-from peace_ros.core.domain import ConfigurationError, GimbalReport, Mount, Pose
+from peace_ros.core.domain import GimbalReport, Mount, Pose
 from peace_ros.core.domain.geometry import camera_pose_on_gimbal
 from peace_ros.core.landing.poses import Miss, PoseHistory
 
@@ -24,16 +24,9 @@ class GimbalMount:
     Args:
         mount: How the camera is turned on the gimbal, and where it is on the vehicle.
         gap_limit_s: Reports farther apart in time are not interpolated.
-
-    Raises:
-        ConfigurationError: tf gives the mount, too.
     """
 
-    def __init__(self, mount: Mount | None, gap_limit_s: float) -> None:
-        if mount is None:
-            raise ConfigurationError(
-                'vehicle.follow_gimbal with mount_source tf: leave mount_source at parameters'
-            )
+    def __init__(self, mount: Mount, gap_limit_s: float) -> None:
         self._mount = mount
         self._attitudes = PoseHistory(gap_limit_s)
         self._in_earth = False

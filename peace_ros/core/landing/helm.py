@@ -89,6 +89,11 @@ class Helm:
         self._budget.fail_attempt(self._reason)
 
     @property
+    def search_path(self) -> tuple[tuple[float, float], ...]:
+        """Way-points (north, east) of the search while a site is looked for, else none."""
+        return self._square.way if self._square is not None and self.state in LOOKING else ()
+
+    @property
     def attempts(self) -> int:
         """Descents that failed in this engagement."""
         return self._budget.attempts

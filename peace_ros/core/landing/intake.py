@@ -36,7 +36,6 @@ from peace_ros.core.mapping import RefusedLookError, SafetyMap
 _PENDING_LIMIT = 4
 _REASONS = 64
 """So many are counted apart."""
-_NO_MOUNT = 'how the camera is mounted is not known yet'
 
 
 class HeatmapIntake:
@@ -50,7 +49,7 @@ class HeatmapIntake:
         parameters: LandingParameters,
         camera: Camera,
         safety_map: SafetyMap,
-        mount: Mount | None = NADIR,
+        mount: Mount = NADIR,
         *,
         on_gimbal: bool = False,
     ) -> None:
@@ -102,14 +101,6 @@ class HeatmapIntake:
         if self._gimbal is not None:
             self._gimbal.clear()
 
-    def place_camera(self, mount: Mount) -> None:
-        """Set how the camera is mounted; what was seen with another mount is dropped."""
-        if mount != self._mount:
-            self._mount = mount
-            self._poses.clear()
-            self._carrier.clear()
-            self._drop_map('the camera is mounted otherwise')
-
     def distrust(self, reason: str) -> None:
         """Drop the map and use nothing that comes while there is a reason; empty: use it again."""
         self._distrusted = reason
@@ -117,12 +108,12 @@ class HeatmapIntake:
             self.clear()
             self._drop_map(reason)
 
-    def add_pose(self, pose: Pose) -> None:
+    def add_pose(self, pose: Pose, mount: Mount | None = None) -> None:
         """Keep a pose, north and east NaN where unknown, and use the heatmaps that wait for it."""
-        if self._mount is None or self.distrusted:
+        if self.distrusted:
             return
         if self._gimbal is None:
-            self._add_camera_pose(camera_pose(self._mount, pose))
+            self._add_camera_pose(camera_pose(mount or self._mount, pose))
         else:
             self._gimbal.add_pose(pose)
 
@@ -177,8 +168,6 @@ class HeatmapIntake:
         newest_ns = self._pending[-1].stamp_ns if self._pending else self._map.stamp_ns
         if self.distrusted:
             self.reject(self.distrusted)
-        elif self._mount is None:
-            self.reject(_NO_MOUNT)
         elif not np.isfinite(heatmap.safety).all():
             self.reject('not finite')
         elif newest_ns is not None and heatmap.stamp_ns <= newest_ns:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from peace_ros.core.domain import NADIR, Camera, Pose
 from peace_ros.core.domain.geometry import (
+    angle_between,
     attitude_enu_flu_to_ned_frd,
     attitude_ned_frd_to_enu_flu,
     camera_pose,
@@ -23,6 +24,7 @@ from peace_ros.core.domain.geometry import (
     mount_from_degrees,
     mount_from_optical,
     ned_to_enu,
+    optical_from_mount,
     quaternion_from_euler,
     rotation_matrix,
     slerp,
@@ -200,6 +202,14 @@ def test_a_camera_is_turned_on_its_gimbal_and_its_place_is_on_the_vehicle() -> N
     assert (placed.north_m, placed.down_m) == pytest.approx((2.0, -99.5))
     north, east = centre_looks_at(placed)
     assert (north, east) == pytest.approx((2.0 + 99.5 * tan(radians(15)), 0.0), abs=1e-6)
+
+
+def test_a_mount_survives_the_way_to_its_optical_frame_and_back() -> None:
+    for turns in ((0.0, 0.0, 0.0), (10.0, -20.0, 130.0)):
+        mount = mount_from_degrees(turns, (0.5, -0.2, 0.1))
+        back = mount_from_optical(*optical_from_mount(mount))
+        assert angle_between(back.quaternion, mount.quaternion) < 1e-6
+        assert back.offset_frd_m == pytest.approx(mount.offset_frd_m)
 
 
 def test_the_mount_by_parameters_and_by_an_optical_frame_are_the_same() -> None:

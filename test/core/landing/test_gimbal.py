@@ -10,7 +10,6 @@ import pytest
 from peace_ros.core.domain import (
     NADIR,
     Camera,
-    ConfigurationError,
     GimbalReport,
     Heatmap,
     Pose,
@@ -102,8 +101,3 @@ def test_a_vehicle_without_a_gimbal_does_not_ask_for_one():
     core = LandingCore(LandingParameters(), CAMERA, None, NADIR)
     fly(core, 1.0, 3.0, lambda _time_s: None)
     assert core.engagement_problem(3 * S, telemetry(3.0, None), 0.1) == ''
-
-
-def test_tf_and_a_gimbal_cannot_both_say_how_the_camera_is_turned():
-    with pytest.raises(ConfigurationError, match='mount_source'):
-        LandingCore(LandingParameters(), CAMERA, None, None, on_gimbal=True)
