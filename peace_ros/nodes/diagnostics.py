@@ -51,20 +51,26 @@ class Diagnostics:
         """Forget all tasks."""
         self._tasks.clear()
 
-    def watch(self, topic: str, unless: Callable[[], str] | None = None) -> Callable[[int], None]:
+    def watch(
+        self, topic: str, unless: Callable[[], str] | None = None, *, periodic: bool = False
+    ) -> Callable[[int], None]:
         """Watch an input; return what is to be called with the stamp (ns) of each message.
 
         Args:
             topic: as it is subscribed to; the last part of its name says what arrives.
             unless: returns why the input is of no use now, empty when it is.
+            periodic: a warning, also in the log, when many of its messages are lost.
         """
         name, noun = self._node.resolve_topic_name(topic), topic.rpartition('/')[2]
-        watch = InputWatch(noun, name, time.monotonic())
+        watch = InputWatch(noun, name, time.monotonic(), periodic=periodic)
 
         def check() -> Health:
             if unless is not None and (reason := unless()):
                 return Health(Level.OK, reason)
-            return watch.health(time.monotonic(), self._node.count_publishers(name))
+            found = watch.health(time.monotonic(), self._node.count_publishers(name))
+            if periodic and found.level is Level.WARN:
+                self._node.say(noun, found.sentence)
+            return found
 
         self.add(noun, check)
         return lambda stamp_ns: watch.arrived(stamp_ns, self._node.clock_ns(), time.monotonic())

@@ -57,7 +57,7 @@ class PromptGeneratorNode(ManagedNode):
         self._generator = self._given or create_generator(parameters, self.get_logger())
         self._last_template = ''
         self._prompt_out = self.create_publisher(DiagnosticArray, 'prompt', RESULT)
-        self._image_arrived = self.diagnostics.watch('image')
+        self._image_arrived = self.diagnostics.watch('image', periodic=True)
         self._work = WorkHealth()
         self.diagnostics.add('prompts', self._work.take)
         if self._shared is None:

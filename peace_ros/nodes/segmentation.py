@@ -70,7 +70,7 @@ class SegmentationNode(ManagedNode):
         self._heatmap_out = self.create_publisher(Image, 'heatmap', IMAGE_OUT)
         self._frame_info_out = self.create_publisher(CameraInfo, FRAME_INFO, RESULT)
         self._overlay_out = self.create_publisher(CompressedImage, 'overlay/compressed', IMAGE_OUT)
-        self._image_arrived = self.diagnostics.watch('image')
+        self._image_arrived = self.diagnostics.watch('image', periodic=True)
         self._work = WorkHealth()
         self.diagnostics.add('heatmaps', self._work.take)
         self._prompts = PromptInput(self, self._options, self._embed, self._complain)
