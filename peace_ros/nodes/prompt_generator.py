@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from peace_ros.core.domain import Health, Level, PeaceError
+from peace_ros.core.domain import Health, Level, PeaceError, Prompt
 from peace_ros.core.health import WorkHealth
 from peace_ros.core.messages import stamp_ns_of
 from peace_ros.core.node_parameters import PromptGeneratorOptions, groups_of
@@ -33,6 +33,7 @@ class PromptGeneratorNode(ManagedNode):
         self,
         generator: PromptGenerator | None = None,
         images: SharedImages | None = None,
+        hand_over: Callable[[Prompt], None] = lambda _prompt: None,
         **options: Any,
     ) -> None:
         """Load the model and subscribe.
@@ -40,6 +41,7 @@ class PromptGeneratorNode(ManagedNode):
         Args:
             generator: in place of the one that the parameters describe.
             images: which another node of this process subscribes to; None: this one does.
+            hand_over: takes each prompt besides, before it is published.
             options: of rclpy's Node.
 
         Raises:
@@ -47,7 +49,7 @@ class PromptGeneratorNode(ManagedNode):
 
         """
         super().__init__('prompt_generator', *groups_of('prompt_generator'), **options)
-        self._given, self._shared = generator, images
+        self._given, self._shared, self._hand_over = generator, images, hand_over
         self._images = images or SharedImages()
         self.start()
 
@@ -94,6 +96,7 @@ class PromptGeneratorNode(ManagedNode):
     def _generate(self, message: ImageMessage) -> None:
         began = time.monotonic()
         prompt = self._generator.generate(self._images.frame(message))
+        self._hand_over(prompt)
         self._prompt_out.publish(prompt_to_message(prompt))
         if prompt.template != self._last_template:
             self._last_template = prompt.template

@@ -82,6 +82,9 @@ def test_one_process_makes_prompts_and_heatmaps_with_the_stamp_of_the_frame(
     bench.until(lambda: bool(prompts) and bool(heatmaps), see)
     assert {stamp_ns_of(prompts[0]), stamp_ns_of(heatmaps[0])} <= set(stamps)
     assert bench.peer.count_subscribers('drone_1/image') == 1
+    ours = {'prompt_generator', 'segmentation'}
+    hearing = bench.peer.get_subscriptions_info_by_topic('/drone_1/prompt')
+    assert not ours & {each.node_name for each in hearing}, 'prompts need no message here'
     nodes = {'drone_1/prompt_generator: image', 'drone_1/segmentation: image'}
     bench.until(lambda: nodes <= {each.name for array in found for each in array.status}, see)
     began_s = time.monotonic()
