@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Prompt generator and segmentation in one process.
 
-An image is received and decoded once, and a prompt is handed on without a message.
+An image is received and decoded once, only the images that segmentation works on are described, and
+a prompt is handed on without a message.
 """
 
 from __future__ import annotations

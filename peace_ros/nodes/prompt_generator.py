@@ -40,7 +40,8 @@ class PromptGeneratorNode(ManagedNode):
 
         Args:
             generator: in place of the one that the parameters describe.
-            images: which another node of this process subscribes to; None: this one does.
+            images: of another node of this process: only what it works on is described. None: this
+                node subscribes.
             hand_over: takes each prompt besides, before it is published.
             options: of rclpy's Node.
 
@@ -59,7 +60,7 @@ class PromptGeneratorNode(ManagedNode):
         self._generator = self._given or create_generator(parameters, self.get_logger())
         self._last_template = ''
         self._prompt_out = self.create_publisher(DiagnosticArray, 'prompt', RESULT)
-        self._image_arrived = self.diagnostics.watch('image', periodic=True)
+        self._image_arrived = self.diagnostics.watch('image', periodic=self._shared is None)
         self._work = WorkHealth()
         self.diagnostics.add('prompts', self._work.take)
         if self._shared is None:
@@ -70,7 +71,7 @@ class PromptGeneratorNode(ManagedNode):
     def activate(self) -> None:
         """Begin to describe frames."""
         self._worker = NewestWorker(self._generate, self._complain, self.fail, 'prompt_generator')
-        self._images.add(self._on_image)
+        self._images.add(self._on_image, when_begun=self._shared is not None)
 
     def deactivate(self) -> None:
         """Describe no further frame."""

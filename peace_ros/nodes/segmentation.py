@@ -130,7 +130,7 @@ class SegmentationNode(ManagedNode):
 
     def _on_image(self, message: ImageMessage) -> None:
         self._image_arrived(stamp_ns_of(message))
-        if self._prompts.is_empty:
+        if self._hears_prompts and self._prompts.is_empty:
             self.say(
                 'waiting',
                 'no prompt has arrived yet, but frames have: is prompt_generator running?',
@@ -139,6 +139,7 @@ class SegmentationNode(ManagedNode):
         self._worker.offer(message)
 
     def _segment(self, message: ImageMessage) -> None:
+        self._images.begin(message)
         chosen = self._prompts.take(stamp_ns_of(message))
         if chosen is None:
             return

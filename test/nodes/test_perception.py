@@ -40,6 +40,19 @@ def test_an_image_is_decoded_once_for_all_who_take_it(frame):
     assert len(got) == 3
 
 
+def test_who_helps_gets_only_the_images_that_work_begins_on():
+    images, helped = SharedImages(), []
+    images.add(helped.append, when_begun=True)
+    images.add(lambda _message: None)
+    for message in ('first', 'second', 'third'):
+        images.offer(message)
+    images.begin('second')
+    assert helped == ['second']
+    images.remove(helped.append)
+    images.begin('third')
+    assert helped == ['second']
+
+
 def test_an_image_that_cannot_be_decoded_is_an_error_for_each(frame):
     images = SharedImages()
 

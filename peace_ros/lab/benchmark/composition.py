@@ -61,7 +61,7 @@ class Load:
     """From the stamp of a frame to the arrival of the first set-point that rests on it."""
 
 
-class _World(Node):  # type: ignore[misc]
+class _HoveringCamera(Node):  # type: ignore[misc]
     """A camera of noise on a vehicle that hovers; notes when heatmaps and set-points come."""
 
     def __init__(self, width: int, height: int, rate_hz: float, **options: Any) -> None:
@@ -120,7 +120,7 @@ def measure(modules: Sequence[str], size: tuple[int, int], rate_hz: float, secon
     """
     arguments = ros_arguments({}, load_preset('peace_cs').path)
     landing = ros_arguments({'interface': 'twist', 'auto_engage': True})
-    world, executor = _World(*size, rate_hz), SingleThreadedExecutor()
+    world, executor = _HoveringCamera(*size, rate_hz), SingleThreadedExecutor()
     executor.add_node(world)
 
     def spin(until_s: float, *, first: bool) -> None:

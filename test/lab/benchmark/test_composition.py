@@ -8,7 +8,7 @@ import pytest
 import rclpy
 from geometry_msgs.msg import TwistStamped
 
-from peace_ros.lab.benchmark.composition import Load, _World, median_of, network_share
+from peace_ros.lab.benchmark.composition import Load, _HoveringCamera, median_of, network_share
 from peace_ros.nodes.messages import header
 
 
@@ -26,7 +26,7 @@ def test_the_networks_are_a_part_of_what_a_frame_takes():
 def world():
     context = rclpy.Context()
     context.init(args=[])
-    node = _World(64, 48, 5.0, context=context)
+    node = _HoveringCamera(64, 48, 5.0, context=context)
     yield node
     node.destroy_node()
     context.try_shutdown()
