@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import hypot
 
 from peace_ros.core.domain import Pose, Setpoint, Site
@@ -196,30 +196,30 @@ class ExpandingSquare:
     _TURNS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 
     def __init__(self, home: tuple[float, float], spacing_m: float, radius_m: float) -> None:
-        self._home = home
-        self._spacing_m = spacing_m
-        self._radius_m = radius_m
-        self._begin()
-
-    def _begin(self) -> None:
-        self._leg = 0
-        self._north, self._east = self._home
+        self.way = tuple(self._way_points(home, spacing_m, radius_m))
+        """Home and the way-points of one round (north, east), all within the radius of home."""
+        self._next = 0
         self.advance()
+
+    def _way_points(
+        self, home: tuple[float, float], spacing_m: float, radius_m: float
+    ) -> Iterator[tuple[float, float]]:
+        (north, east), leg = home, 0
+        while hypot(north - home[0], east - home[1]) <= radius_m:
+            yield north, east
+            turn_north, turn_east = self._TURNS[leg % 4]
+            north += turn_north * (leg // 2 + 1) * spacing_m
+            east += turn_east * (leg // 2 + 1) * spacing_m
+            leg += 1
 
     def advance(self) -> None:
         """Go on to the next way-point: this one is reached, or cannot be."""
-        turn_north, turn_east = self._TURNS[self._leg % 4]
-        length = (self._leg // 2 + 1) * self._spacing_m
-        self._north += turn_north * length
-        self._east += turn_east * length
-        self._leg += 1
+        rounds = max(1, len(self.way) - 1)
+        self._next = min(self._next % rounds + 1, len(self.way) - 1)
 
     def target(self, pose: Pose) -> tuple[float, float]:
-        """Return the way-point to fly to from here (north, east), within the radius of home."""
-        if hypot(self._north - pose.north_m, self._east - pose.east_m) <= self._ARRIVED_M:
+        """Return the way-point to fly to from here (north, east)."""
+        north, east = self.way[self._next]
+        if hypot(north - pose.north_m, east - pose.east_m) <= self._ARRIVED_M:
             self.advance()
-        if hypot(self._north - self._home[0], self._east - self._home[1]) > self._radius_m:
-            self._begin()
-            if self._spacing_m > self._radius_m:
-                return self._home
-        return self._north, self._east
+        return self.way[self._next]

@@ -89,6 +89,11 @@ class Helm:
         self._budget.fail_attempt(self._reason)
 
     @property
+    def search_path(self) -> tuple[tuple[float, float], ...]:
+        """Way-points (north, east) of the search while a site is looked for, else none."""
+        return self._square.way if self._square is not None and self.state in LOOKING else ()
+
+    @property
     def attempts(self) -> int:
         """Descents that failed in this engagement."""
         return self._budget.attempts
@@ -106,6 +111,7 @@ class Helm:
         sighting: Sighting,
         last_rejection: str = '',
         heights: HeightSight = NO_OTHER_HEIGHT,
+        distrusted: str = '',
     ) -> Decision:
         """Decide what to do now.
 
@@ -116,12 +122,13 @@ class Helm:
             sighting: What the map says.
             last_rejection: Why the newest heatmap was not used, for the sentence.
             heights: What other sources say of the altitude.
+            distrusted: Why inputs cannot be used, whatever they say; empty when they can.
         """
         p = self._p
         if self._since_ns is None:
             self._since_ns = now_ns
         pose = valid_pose(telemetry, p)
-        bad_data = bad_telemetry(telemetry, telemetry_age_s, p)
+        bad_data = distrusted or bad_telemetry(telemetry, telemetry_age_s, p)
         bad_data = bad_data or bad_map(sighting.map_age_s, last_rejection, p) or heights.problem
         site = None if bad_data else sighting.reachable
         if self._engaged:

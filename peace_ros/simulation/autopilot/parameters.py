@@ -108,6 +108,16 @@ class AutopilotParameters(ParameterSet):
         low=0.0,
         high=20.0,
     )
+    has_gimbal: bool = parameter(
+        False, 'A gimbal keeps the camera level with the horizon and reports its attitude.'
+    )
+    gimbal_pitch_deg: float = parameter(
+        -90.0,
+        'Its view above the horizon; -90 looks straight down.',
+        unit='deg',
+        low=-90.0,
+        high=0.0,
+    )
     rangefinder_max_m: float = parameter(
         0.0, 'Range of the downward rangefinder; 0: there is none.', unit='m', low=0.0, high=500.0
     )

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, degrees, isfinite, nan, pi, radians
+from math import cos, degrees, isfinite, nan, pi, radians, sin
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -58,6 +58,7 @@ class Streams:
             mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
             mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: self._position_target,
+            mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: self._gimbal,
             estimator: ekf_status if estimator == EKF_STATUS else estimator_status,
         }
         if self._personality.is_px4:
@@ -222,6 +223,23 @@ class Streams:
             0,
             mavlink.MAV_SENSOR_ROTATION_PITCH_270,
             255,
+        )
+
+    def _gimbal(self, flight: Flight) -> Any:
+        """Return GIMBAL_DEVICE_ATTITUDE_STATUS: level in roll, turned with the vehicle."""
+        if not self._parameters.has_gimbal:
+            return None
+        half_rad = radians(self._parameters.gimbal_pitch_deg) / 2.0
+        flags = (
+            mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK
+            | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
+            | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
+        )
+        quaternion = [cos(half_rad), 0.0, sin(half_rad), 0.0]
+        yaw_rad = flight.physics.yaw_rad
+        boot_ms = self._boot_ms(flight)
+        return mavlink.MAVLink_gimbal_device_attitude_status_message(
+            0, 0, boot_ms, flags, quaternion, 0.0, 0.0, 0.0, 0, yaw_rad, 0.0, 1
         )
 
 

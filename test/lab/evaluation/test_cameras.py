@@ -28,7 +28,7 @@ def test_a_camera_that_is_taken_for_another_one_is_noticed(monkeypatch, wrong):
     if wrong == 'stretched':
         flight._camera = Camera.from_degrees(352, 352, 95.0)
     else:
-        flight._core.place_camera(NADIR)
+        monkeypatch.setattr(flight._core._intake, '_mount', NADIR)
     landed = flight.run()
     landing = CameraLanding(landed, *flight.clearances_m, flight.map_error_m())
     assert not landing.is_good, landing
