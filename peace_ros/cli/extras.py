@@ -15,6 +15,8 @@ EXTRA_OF = {
     'zstandard': 'simulation',
     'rasterio': 'geo',
     'jinja2': 'lab',
+    'av': 'video',
+    'pyulog': 'logs',
     'matplotlib': 'simulation',
     'pyarrow': 'experiment',
     'scipy': 'experiment',

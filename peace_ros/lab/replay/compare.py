@@ -27,7 +27,8 @@ from peace_ros.lab.export.agreement import mask_iou
 from peace_ros.lab.replay.line import Step
 from peace_ros.lab.replay.report import SAFE_FROM
 from peace_ros.lab.replay.run import Replayer
-from peace_ros.lab.replay.source import SourceOptions, open_source
+from peace_ros.lab.replay.source import open_source
+from peace_ros.lab.replay.source_options import SourceOptions
 
 LEAST_IOU = 0.9
 """Of what is called safe, and of what is not, over the whole recording."""

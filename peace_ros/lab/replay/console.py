@@ -50,9 +50,9 @@ def _table(report: ReplayReport, folder: Path) -> Table:
     if report.altitudes_m is not None:
         altitudes = '{:.1f} to {:.1f} m above ground'.format(*report.altitudes_m)
     for name, value in (
+        *(('note', each) for each in report.remarks),
         ('recording', report.source),
         ('frames', frames),
-        *(('note', each) for each in report.remarks),
         ('altitude', altitudes),
         (
             'recorded',

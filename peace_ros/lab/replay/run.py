@@ -17,11 +17,11 @@ from peace_ros.lab.replay.outputs import ReplayOutputs
 from peace_ros.lab.replay.report import ReplayReport, ReportBuilder
 from peace_ros.lab.replay.source import (
     RecordingSource,
-    SourceOptions,
     Taken,
     VideoSource,
     open_source,
 )
+from peace_ros.lab.replay.source_options import SourceOptions
 from peace_ros.recording.run_folder import create_run_folder
 
 Progress = Callable[[int, int, str], None]
@@ -138,6 +138,8 @@ class Replayer:
             for step in line.steps_until(last_ns + _TAIL_NS):
                 self._builder.add_step(step)
                 yield step
+        told = self.report.remarks
+        told += [each for each in self._source.remarks if each not in told]
         self.report.elapsed_s = time.monotonic() - began
 
     def _line(self, taken: Taken) -> ReplayLine:

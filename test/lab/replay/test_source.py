@@ -158,7 +158,7 @@ def test_a_video_gets_a_camera_and_an_altitude(tmp_path) -> None:
     assert len(stamps(source)) == 11
     assert source.options.assumed_camera(64, 64) == Camera.from_degrees(64, 64, 60.0)
     assert next(source.frames()).frame.camera is None
-    assert [source.poses[k].altitude_agl_m for k in (0, 5, 10)] == pytest.approx([80, 55, 30])
+    assert [source.poses[k].altitude_agl_m for k in (0, 10, 20)] == pytest.approx([80, 55, 30])
     assert source.remarks == ['no altitude was recorded: 80:30 m is assumed, linear (--altitude)']
 
 
