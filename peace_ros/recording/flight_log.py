@@ -8,9 +8,10 @@ MAVLink telemetry (``.tlog``) and ArduPilot DataFlash (``.bin``) are read with p
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
 from enum import Enum
 from io import StringIO
@@ -85,9 +86,8 @@ def read_flight_log(path: Path) -> FlightLog:
         raise RecordingError(f'{path} is not a flight log: give a file of {", ".join(_READERS)}')
     if path.stat().st_size > _LARGEST_BYTES:
         raise RecordingError(f'{path} is larger than {_LARGEST_BYTES >> 30} GiB: give a part of it')
-    said = StringIO()
     try:
-        with redirect_stdout(said), redirect_stderr(said):
+        with _quiet():
             track = reader(path)
     except ModuleNotFoundError:
         raise
@@ -97,6 +97,20 @@ def read_flight_log(path: Path) -> FlightLog:
             'an intact one'
         ) from error
     return _flight_log(track, path)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the readers, which are compiled in part, from writing to the terminal."""
+    kept, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 2)
+        with redirect_stdout(StringIO()):
+            yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(null)
 
 
 def subtitles_of(video: Path) -> Path | None:

@@ -18,17 +18,16 @@ from heapq import merge
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import yaml
 import zstandard
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from rosbags.rosbag1 import Reader as Ros1Reader
-from rosbags.rosbag1 import ReaderError as Ros1ReaderError
-from rosbags.rosbag2 import Reader, ReaderError
+from rosbags.rosbag2 import Reader
 
-from peace_ros.core.domain import RecordingError
+from peace_ros.core.domain import ConfigurationError, RecordingError
+from peace_ros.core.yaml_files import read_yaml
 
 STORAGES = ('.mcap', '.db3', '.bag')
 COMPRESSED = ('.zstd', '.zst')
@@ -45,6 +44,8 @@ MCAP_ERRORS: tuple[type[Exception], ...] = (
     KeyError,
     IndexError,
     TypeError,
+    OverflowError,
+    MemoryError,
 )
 """What mcap lets out on files that are cut short or overwritten, beside its own errors."""
 
@@ -93,7 +94,7 @@ class McapStorage(RecordingFile):
         self._file = path.open('rb')
         try:
             self._reader: SeekingReader | None = SeekingReader(
-                self._file, record_size_limit=_LARGEST_RECORD
+                self._file, validate_crcs=True, record_size_limit=_LARGEST_RECORD
             )
             counted = self._by_summary(self._reader)
             if counted is None:
@@ -163,7 +164,7 @@ class McapStorage(RecordingFile):
         self._file.seek(0)
         whole = 0
         try:
-            reader = StreamReader(self._file, record_size_limit=_LARGEST_RECORD)
+            reader = StreamReader(self._file, validate_crcs=True, record_size_limit=_LARGEST_RECORD)
             for record in reader.records:
                 whole += isinstance(record, Message)
                 yield record
@@ -266,10 +267,12 @@ def files_of(path: Path) -> list[Path]:
             f'folder {path} holds no metadata.yaml: give a bag folder, or its .mcap or .db3'
         )
     try:
-        content = yaml.safe_load(metadata.read_text(encoding='utf-8'))
+        content = read_yaml(metadata, 'give the .mcap or .db3 itself')
         listed = content['rosbag2_bagfile_information']['relative_file_paths']
         files = [path / Path(str(each)).name for each in listed]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
+    except ConfigurationError as error:
+        raise RecordingError(str(error)) from error
+    except (KeyError, TypeError, ValueError) as error:  # ValueError: a name with a NUL
         raise RecordingError(
             f'{metadata} does not tell the files of the bag ({type(error).__name__}): '
             'give the .mcap or .db3 itself'
@@ -310,6 +313,3 @@ def _decompressed(data: bytes) -> bytes:
     if data[:4] == _ZSTD:
         return zstandard.ZstdDecompressor().decompressobj().decompress(data)
     return data
-
-
-ROSBAGS_ERRORS: tuple[type[Exception], ...] = (ReaderError, Ros1ReaderError)

@@ -307,7 +307,7 @@ def test_messages_may_be_compressed_one_by_one(tmp_path) -> None:
 @pytest.mark.parametrize(
     ('text', 'says'),
     [
-        ('a: [', 'does not tell the files'),
+        ('a: [', 'not usable YAML'),
         ('a: 1', 'does not tell the files'),
         ('rosbag2_bagfile_information: {relative_file_paths: []}', 'names no files'),
         ('rosbag2_bagfile_information: {relative_file_paths: [x.db3]}', 'names x.db3, which'),
