@@ -15,7 +15,7 @@ LINES_OF_WHAT_FLIES = 18_120
 """Of core and nodes: 14,500, what learns a biased velocity and finds faulty axes, what names the
 cause that stops the vehicle (fence, second commander, failsafe after a silent line), what compares
 heights, what knows lens, mount, shape and encodings of the camera, diagnostics of every input, live
-parameters, managed nodes that may share a process, what people see, and limits on files of others."""
+parameters, managed nodes that may share a process, what people see, and limits on files."""
 LINES_OF_A_NODE_FILE = 200
 
 
