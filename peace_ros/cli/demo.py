@@ -19,4 +19,4 @@ def demo(*, options: DemoOptions) -> None:
     """
     from peace_ros.simulation.demo.run import run_demo
 
-    raise typer.Exit(run_demo(options, Console()))
+    raise typer.Exit(run_demo(options, Console(markup=False)))

@@ -27,4 +27,4 @@ def replay(
     ] = None,
 ) -> None:
     """Run prompts, segmentation and landing over a recording; the vehicle cannot be moved."""
-    replay_in_terminal(ReplayOptions(source, config, out, options), Console())
+    replay_in_terminal(ReplayOptions(source, config, out, options), Console(markup=False))

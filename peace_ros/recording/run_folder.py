@@ -58,6 +58,7 @@ def write_whole(path: Path, content: bytes | str, what: str) -> None:
     """
     partial = path.with_name(f'.{path.name}.partial')
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         partial.write_bytes(content if isinstance(content, bytes) else content.encode())
         partial.replace(path)
     except OSError as error:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import dataclass
+from io import BytesIO
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from peace_ros.lab.replay.report import SAFE_FROM
 from peace_ros.lab.replay.run import Replayer
 from peace_ros.lab.replay.source import open_source
 from peace_ros.lab.replay.source_options import SourceOptions
+from peace_ros.recording.run_folder import write_whole
 
 LEAST_IOU = 0.9
 """Of what is called safe, and of what is not, over the whole recording."""
@@ -63,8 +65,11 @@ class Reference:
                 for stamp_ns, prompt in zip(self.stamps_ns, self.prompts, strict=True)
             ],
         }
-        stem.with_suffix('.json').write_text(json.dumps(content, indent=1) + '\n')
-        np.savez_compressed(stem.with_suffix('.npz'), safe=np.packbits(self.safe))
+        packed = BytesIO()
+        np.savez_compressed(packed, safe=np.packbits(self.safe))
+        write_whole(stem.with_suffix('.npz'), packed.getvalue(), 'expected replay')
+        content_json = json.dumps(content, indent=1) + '\n'
+        write_whole(stem.with_suffix('.json'), content_json, 'expected replay')
 
     @classmethod
     def read(cls, stem: Path) -> Reference:

@@ -9,7 +9,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
+from peace_ros.lab.replay.outputs import QUIET_STATES
 from peace_ros.lab.replay.report import ReplayReport
 from peace_ros.lab.replay.run import ReplayOptions, replay
 
@@ -37,6 +39,12 @@ def replay_in_terminal(options: ReplayOptions, console: Console) -> ReplayReport
     return report
 
 
+def _visit(state: dict[str, float | str]) -> str:
+    """Return name and time of a visit, and why the vehicle waited or was given back."""
+    reason = f' ({state["reason"]})' if state['name'] in QUIET_STATES else ''
+    return f'{state["name"]} {float(state["seconds"]):.1f} s{reason}'
+
+
 def _table(report: ReplayReport, folder: Path) -> Table:
     table = Table(show_header=False)
     table.add_column(no_wrap=True)
@@ -44,7 +52,7 @@ def _table(report: ReplayReport, folder: Path) -> Table:
     frames = f'{report.frames}'
     if report.unusable_frames:
         frames += f', {report.unusable_frames} unusable: {report.first_fault}'
-    states = ', '.join(f'{each["name"]} {float(each["seconds"]):.1f} s' for each in report.states)
+    states = ', '.join(map(_visit, report.states))
     fates = ', '.join(f'{count} {fate}' for fate, count in report.heatmaps.items())
     altitudes = 'none'
     if report.altitudes_m is not None:
@@ -66,5 +74,5 @@ def _table(report: ReplayReport, folder: Path) -> Table:
         ('outcome', report.outcome or 'none by the end of the recording'),
         ('results', str(folder)),
     ):
-        table.add_row(name, value)
+        table.add_row(name, Text(value))  # a path may look like markup
     return table

@@ -12,6 +12,7 @@ from pathlib import Path
 from peace_ros.core.domain import PeaceError, RecordingError
 from peace_ros.core.pipeline import SegmentedFrame
 from peace_ros.core.presets import DEFAULT_PRESET, load_preset
+from peace_ros.lab.replay.altitude_check import AltitudeCheck
 from peace_ros.lab.replay.line import ReplayLine, Step
 from peace_ros.lab.replay.outputs import ReplayOutputs
 from peace_ros.lab.replay.report import ReplayReport, ReportBuilder
@@ -113,6 +114,7 @@ class Replayer:
         began = time.monotonic()
         frames = self._source.frames()
         line: ReplayLine | None = None
+        altitudes: AltitudeCheck | None = None
         last_ns = 0
         for taken in frames:
             if taken.frame is None:
@@ -120,6 +122,7 @@ class Replayer:
                 continue
             if line is None:
                 line = self._line(taken)
+                altitudes = AltitudeCheck(self._source.options.assumed_camera(*taken.frame.size_px))
             last_ns = taken.stamp_ns
             if gap_s := line.skip_gap(taken.stamp_ns):
                 self.report.remarks.append(f'nothing was recorded for {gap_s:.0f} s: left out')
@@ -132,6 +135,8 @@ class Replayer:
                 self._builder.add_fault(str(error))
                 continue
             self._builder.add_look(look)
+            if (pose := line.camera_pose_at(taken.stamp_ns)) is not None and altitudes is not None:
+                altitudes.add(taken.frame, pose)
             self.report.elapsed_s = time.monotonic() - began
             yield look
         if line is not None:
@@ -140,6 +145,8 @@ class Replayer:
                 yield step
         told = self.report.remarks
         told += [each for each in self._source.remarks if each not in told]
+        if altitudes is not None and (doubt := altitudes.remark()) is not None:
+            told.insert(0, doubt)
         self.report.elapsed_s = time.monotonic() - began
 
     def _line(self, taken: Taken) -> ReplayLine:

@@ -186,7 +186,7 @@ class BagSource:
                 stamp_ns = receipt_ns if self._unstamped else stamp_ns_of(message)
                 if not picker.takes(stamp_ns):
                     continue
-                if fault := _order_fault(stamp_ns, last_ns):
+                if fault := _order_fault(stamp_ns, last_ns) or self._clock_fault(stamp_ns):
                     yield Taken(stamp_ns, None, fault)
                     continue
                 last_ns = stamp_ns
@@ -198,6 +198,13 @@ class BagSource:
                     yield Taken(stamp_ns, None, str(error))
                 if picker.is_done:
                     return
+
+    def _clock_fault(self, stamp_ns: int) -> str:
+        """Return why a stamp is not of the clock of the poses: one alone would end the replay."""
+        after_s = (stamp_ns - self.poses[-1].stamp_ns) * 1e-9
+        if after_s <= _CLOCKS_APART_S:
+            return ''
+        return f'stamp {stamp_ns} ns is {after_s:.0f} s after the last pose: its clock jumped'
 
     def _poses(self, bag: BagReader) -> list[Pose]:
         options = self.options

@@ -4,8 +4,9 @@
 
 ``small_digest.npz`` was written by version 3523282, then again when clearance began to count to the
 nearest corner of the obstacle (a site is found 0.5 s later, no heatmap changed). The networks'
-sums differ a little between processors. Where the checksums of all heatmaps are those of the stored version, decisions and
-set-points must be equal too; elsewhere heatmaps and states are compared with a tolerance.
+sums differ a little between processors. Where the checksums of all heatmaps are those of the
+stored version, decisions and set-points must be equal too; elsewhere heatmaps and states are
+compared with a tolerance.
 ``python test_digest.py FILE`` writes what this version gives.
 """
 
