@@ -8,6 +8,7 @@ topics, services and the kind of storage may be missing or older than the files.
 
 from __future__ import annotations
 
+import shutil
 import struct
 import tempfile
 from abc import ABC, abstractmethod
@@ -247,8 +248,7 @@ class Storages:
         if path.suffix.lower() in COMPRESSED:
             folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
             whole = folder / path.stem
-            with path.open('rb') as source, whole.open('wb') as target:
-                zstandard.ZstdDecompressor().copy_stream(source, target)
+            _unpack(path, whole)
             path = whole
         return McapStorage(path) if path.suffix.lower() == '.mcap' else RosbagsStorage(_plain(path))
 
@@ -260,6 +260,8 @@ def files_of(path: Path) -> list[Path]:
         RecordingError: there is none, or the metadata of the folder cannot be used.
     """
     if not path.is_dir():
+        if not path.is_file():
+            raise RecordingError(f'{path} is a device or a pipe: give a file')
         return [path]
     metadata = path / 'metadata.yaml'
     if not metadata.is_file():
@@ -284,6 +286,20 @@ def files_of(path: Path) -> list[Path]:
             'give the .mcap or .db3 itself'
         )
     return files
+
+
+def _unpack(packed: Path, whole: Path) -> None:
+    """Unpack a file into at most half of the room that is free."""
+    most = left = shutil.disk_usage(whole.parent).free // 2
+    with packed.open('rb') as source, whole.open('wb') as target:
+        for part in zstandard.ZstdDecompressor().read_to_iter(source):
+            left -= len(part)
+            if left < 0:
+                raise RecordingError(
+                    f'{packed} is larger than {most >> 20} MiB when unpacked, half of what '
+                    f'{whole.parent.parent} has free: unpack it elsewhere and give the .mcap'
+                )
+            target.write(part)
 
 
 def is_recording(path: Path) -> bool:
