@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
 from enum import Enum
-from io import StringIO
+from io import BufferedReader, FileIO, StringIO
 from itertools import groupby
 from math import cos, isfinite, radians
 from pathlib import Path
@@ -33,6 +33,8 @@ _UNIX_S = 1e9
 """Stamps from here on are Unix time, earlier ones count from the boot of the autopilot."""
 _HIGHEST_M = 20_000.0
 _LARGEST_BYTES = 4 << 30
+_DATAFLASH_PADDING_BYTES = 528
+"""Logs that were written in blocks may end with this much of an older log."""
 _INVALID_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: ground stations, cameras, gimbals
 
 
@@ -89,7 +91,7 @@ def read_flight_log(path: Path) -> FlightLog:
     try:
         with _quiet():
             track = reader(path)
-    except ModuleNotFoundError:
+    except (ModuleNotFoundError, RecordingError):
         raise
     except Exception as error:  # pymavlink raises what it likes on damaged files, Exception too
         raise RecordingError(
@@ -195,29 +197,29 @@ def _turns_at(times: NDArray[np.float64], attitudes: NDArray[np.float64]) -> NDA
 
 def _read_tlog(path: Path) -> _Track:
     """Read the messages of one autopilot; their times are those of receipt on the ground."""
-    from pymavlink import mavutil  # noqa: PLC0415 -- slow to import
+    from pymavlink.mavutil import mode_string_v10  # noqa: PLC0415 -- slow to import
 
-    mavutil.set_dialect('ardupilotmega')
-    log = mavutil.mavlogfile(str(path), robust_parsing=True)
+    from peace_ros.recording.telemetry_log import TelemetryLog  # noqa: PLC0415 -- as above
+
+    heartbeat, attitude, position = 0, 30, 33  # MAVLink numbers; the last is GLOBAL_POSITION_INT
+    log = TelemetryLog(path, (heartbeat, attitude, position))
     track, autopilot = _Track(), None
-    try:
-        kinds = ['HEARTBEAT', 'GLOBAL_POSITION_INT', 'ATTITUDE']
-        while (message := log.recv_match(type=kinds)) is not None:
-            at_s, kind = float(message._timestamp), message.get_type()  # noqa: SLF001 (pymavlink)
-            is_flying = kind == 'HEARTBEAT' and message.autopilot != _INVALID_AUTOPILOT
-            if autopilot is None and is_flying:
-                autopilot = message.get_srcSystem()
-            if message.get_srcSystem() != autopilot:
-                continue
-            if is_flying:
-                track.modes.append((at_s, str(mavutil.mode_string_v10(message))))
-            elif kind == 'ATTITUDE':
-                track.add_angles(at_s, message.roll, message.pitch, message.yaw)
-            elif kind == 'GLOBAL_POSITION_INT':
-                place = message.lat * 1e-7, message.lon * 1e-7, message.relative_alt * 1e-3
-                track.positions.append((at_s, *place))
-    finally:
-        log.close()
+    for at_s, message in log.messages():
+        kind = message.get_msgId()
+        is_flying = kind == heartbeat and message.autopilot != _INVALID_AUTOPILOT
+        if autopilot is None and is_flying:
+            autopilot = message.get_srcSystem()
+        if message.get_srcSystem() != autopilot:
+            continue
+        if is_flying:
+            track.modes.append((at_s, str(mode_string_v10(message))))
+        elif kind == attitude:
+            track.add_angles(at_s, message.roll, message.pitch, message.yaw)
+        elif kind == position:
+            place = message.lat * 1e-7, message.lon * 1e-7, message.relative_alt * 1e-3
+            track.positions.append((at_s, *place))
+    if log.remark:
+        track.remarks.append(log.remark)
     return track
 
 
@@ -227,6 +229,16 @@ def _read_dataflash(path: Path) -> _Track:
 
     log, track = DFReader_binary(str(path)), _Track()
     try:
+        known = sum(
+            len(at) * log.formats[kind].len
+            for kind, at in enumerate(log.offsets)
+            if kind in log.formats
+        )
+        if (unknown := path.stat().st_size - known) >= _DATAFLASH_PADDING_BYTES:
+            track.remarks.append(
+                f'{unknown} of {path.stat().st_size} bytes of {path.name} are damaged, or come '
+                'after damage that the reader cannot pass: left out'
+            )
         while (message := log.recv_match(type=['POS', 'ATT', 'MODE'])) is not None:
             at_s, kind = float(message._timestamp), message.get_type()  # noqa: SLF001 (pymavlink)
             if kind == 'POS':
@@ -248,7 +260,9 @@ def _read_ulog(path: Path) -> _Track:
 
     wanted = ['vehicle_local_position', 'vehicle_attitude', 'vehicle_status', 'home_position']
     gnss = ['vehicle_gps_position', 'sensor_gps']
-    log = ULog(str(path), [*wanted, *gnss])
+    with _WatchedFile(FileIO(path)) as file:
+        log = ULog(file, [*wanted, *gnss])
+        missing = file.missing
     by_name = {each.name: each.data for each in reversed(log.data_list)}
     track = _Track(in_degrees=False)
     unix_s = next((_unix_offset_s(by_name[name]) for name in gnss if name in by_name), 0.0)
@@ -270,7 +284,28 @@ def _read_ulog(path: Path) -> _Track:
         track.modes = [(float(at), _NAV_STATES.get(int(s), f'nav_state {s}')) for at, s in stamped]
     if log.file_corruption:
         track.remarks.append(f'{path.name} is damaged in places: what is there is used')
+    if missing:
+        track.remarks.append(
+            f'the last {missing} bytes of {path.name} are no whole message: it was cut short, or '
+            'is damaged before them; they are left out'
+        )
     return track
+
+
+class _WatchedFile(BufferedReader):
+    """A file that knows whether its end came too early.
+
+    pyulog ends in silence where a message seems to be longer than the rest of the file.
+    """
+
+    missing = 0
+    """Bytes of the last read when they were fewer than asked for."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Read as any file does."""
+        data = super().read(size)
+        self.missing = len(data) if size is not None and len(data) < size else 0
+        return data
 
 
 def _unix_offset_s(gnss: dict[str, Any]) -> float:

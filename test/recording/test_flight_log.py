@@ -4,16 +4,21 @@
 
 from __future__ import annotations
 
+import socket
 import struct
+import time
+from collections import Counter
 from math import cos, degrees, radians
 from pathlib import Path
 
 import pytest
+from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain import RecordingError
 from peace_ros.core.domain.geometry import quaternion_from_euler, yaw_from_quaternion
 from peace_ros.recording.flight_log import LogClock, read_flight_log, subtitles_of
+from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim
 
 UNIX_S = 1_700_000_000
 LATITUDE, LONGITUDE = 48.0, 11.0
@@ -206,3 +211,132 @@ def test_what_is_not_a_log_is_one_sentence(tmp_path, name, content) -> None:
         read_flight_log(tmp_path / name)
     assert name in str(told.value)
     assert '\n' not in str(told.value)
+
+
+@pytest.mark.parametrize('autopilot', ['ardupilot', 'px4'])
+def test_what_a_simulated_autopilot_sends_is_read_as_a_telemetry_log(tmp_path, autopilot) -> None:
+    with socket.socket() as free:
+        free.bind(('127.0.0.1', 0))
+        port = free.getsockname()[1]
+    parameters = AutopilotParameters(autopilot=autopilot, port=0, tcp_port=port, speed=2.0)
+    sim = AutopilotSim(parameters)
+    sim.step(43.0)
+    if autopilot == 'ardupilot':
+        sim.pilot_mode('GUIDED')
+    sim.flight.arm()
+    sim.flight.take_off(26.0 + (parameters.home_altitude_msl_m if autopilot == 'px4' else 0.0))
+    sim.step(25.0)
+    path = tmp_path / 'a.tlog'
+    with sim:
+        record_telemetry(port, path, positions=20)
+        truth = sim.truth()
+    log = read_flight_log(path)
+    assert log.clock is LogClock.UNIX
+    assert len(log.poses) > 10
+    assert log.poses[-1].altitude_agl_m == pytest.approx(truth.altitude_agl_m, abs=1.5)
+    assert truth.altitude_agl_m > 20.0
+    assert log.modes[0][1] == ('GUIDED' if autopilot == 'ardupilot' else 'LOITER')
+    assert not any('damaged' in remark for remark in log.remarks)
+
+
+def record_telemetry(port: int, path: Path, positions: int) -> None:
+    """Write what a ground station hears, until it has some positions."""
+    line = mavutil.mavlink_connection(
+        f'tcp:127.0.0.1:{port}', source_system=255, autoreconnect=False
+    )
+    counts: Counter[str] = Counter()
+    end_s = time.monotonic() + 20.0
+    with path.open('wb') as file:
+        while counts['GLOBAL_POSITION_INT'] < positions and time.monotonic() < end_s:
+            message = line.recv_match(blocking=True, timeout=0.5)
+            if message is None:
+                line.mav.heartbeat_send(6, 8, 0, 0, 0)
+                continue
+            if message.get_type() == 'HEARTBEAT' and not counts['HEARTBEAT']:
+                for number in (30, 33):  # ATTITUDE, GLOBAL_POSITION_INT
+                    line.mav.command_long_send(1, 1, 511, 0, number, 50_000, 0, 0, 0, 0, 0)
+            counts[message.get_type()] += 1
+            file.write(struct.pack('>Q', round(time.time() * 1e6)) + message.get_msgbuf())
+    line.close()
+
+
+@pytest.mark.parametrize('stray', [b'x', b'\xfd', bytes(4), b'\xfe' * 8, bytes(range(40))])
+@pytest.mark.parametrize('at', [0.0, 0.3, 0.5])
+def test_stray_bytes_in_telemetry_cost_two_messages_and_are_said(tmp_path, stray, at) -> None:
+    whole = write_tlog(tmp_path / 'whole.tlog')
+    content = whole.read_bytes()
+    for shift in range(0, 50, 9):  # in a time, a header, a payload, between messages
+        place = round(len(content) * at) + shift
+        path = tmp_path / 'a.tlog'
+        path.write_bytes(content[:place] + stray + content[place:])
+        log = read_flight_log(path)
+        assert len(log.poses) >= len(read_flight_log(whole).poses) - 2
+        assert log.poses[-1].stamp_ns == pytest.approx((UNIX_S + SECONDS) * 1e9, abs=0.3e9)
+        assert any('of a.tlog in 1 places are damaged' in each for each in log.remarks)
+    assert read_flight_log(whole).remarks == []
+
+
+def test_a_damaged_time_in_telemetry_costs_its_message_and_a_set_clock_none(tmp_path) -> None:
+    content = write_tlog(tmp_path / 'a.tlog').read_bytes()
+    whole = read_flight_log(tmp_path / 'a.tlog')
+    place = content.index(struct.pack('>Q', round((UNIX_S + 10.0) * 1e6)))
+    damaged = bytearray(content)
+    damaged[place] ^= 0x40
+    (tmp_path / 'b.tlog').write_bytes(damaged)
+    log = read_flight_log(tmp_path / 'b.tlog')
+    assert log.poses[-1] == whole.poses[-1]
+    assert any('of b.tlog in 1 places are damaged' in each for each in log.remarks)
+    # A ground station without a clock gets the time by GNSS: 1970 becomes this century.
+    early = bytearray(content)
+    for at_s, *_ in track():
+        old, new = (struct.pack('>Q', round((unix + at_s) * 1e6)) for unix in (UNIX_S, 1000))
+        if at_s < 10.0:
+            early = early.replace(old, new)
+    (tmp_path / 'c.tlog').write_bytes(early)
+    log = read_flight_log(tmp_path / 'c.tlog')
+    assert len(log.poses) == len(whole.poses)
+    assert log.poses[-1].stamp_ns == whole.poses[-1].stamp_ns
+    assert not any('damaged messages' in each for each in log.remarks)
+
+
+def test_what_is_mostly_not_telemetry_is_refused_before_all_of_it_is_searched(tmp_path) -> None:
+    with (tmp_path / 'a.tlog').open('wb') as file:
+        file.write(b'\xfd\x00\x00' * 400_000)
+        file.truncate(3 << 30)
+    with pytest.raises(RecordingError, match='are no MAVLink with times of receipt'):
+        read_flight_log(tmp_path / 'a.tlog')
+
+
+def test_damage_within_a_dataflash_log_is_said(tmp_path) -> None:
+    content = write_dataflash(tmp_path / 'a.bin').read_bytes()
+    assert read_flight_log(tmp_path / 'a.bin').remarks == []
+    middle = len(content) // 2
+    (tmp_path / 'a.bin').write_bytes(content[:middle] + bytes(900) + content[middle:])
+    log = read_flight_log(tmp_path / 'a.bin')
+    assert any('bytes of a.bin are damaged' in each for each in log.remarks)
+
+
+@pytest.mark.parametrize(
+    ('damage', 'told'),
+    [
+        (b'\xff' * 90, 'are no whole message'),
+        (bytes(90), 'a.ulg is damaged in places'),
+        (b'x' * 8, 'are no whole message'),
+    ],
+)
+def test_damage_within_a_ulog_is_said(tmp_path, damage, told) -> None:
+    content = write_ulog(tmp_path / 'a.ulg').read_bytes()
+    assert read_flight_log(tmp_path / 'a.ulg').remarks == []
+    middle = len(content) // 2
+    (tmp_path / 'a.ulg').write_bytes(content[:middle] + damage + content[middle:])
+    log = read_flight_log(tmp_path / 'a.ulg')
+    assert any(told in remark for remark in log.remarks)
+    assert len(log.poses) > 0.4 * SECONDS * 10
+
+
+def test_a_ulog_that_was_cut_short_is_read_up_to_there_and_said(tmp_path) -> None:
+    content = write_ulog(tmp_path / 'a.ulg').read_bytes()
+    (tmp_path / 'a.ulg').write_bytes(content[: len(content) // 2])
+    log = read_flight_log(tmp_path / 'a.ulg')
+    assert 'it was cut short, or is damaged' in log.remarks[0]
+    assert len(log.poses) > 0.4 * SECONDS * 10
