@@ -5,9 +5,13 @@
 During a climb or a descent the pictures give the ratio of the heights at its ends, the poses their
 difference. Both together give the height itself: a descent from 60 m to 50 m lets the ground grow
 more than one from 180 m to 170 m.
+
+Altitudes that were assumed have no true difference. Then only the ratios are compared.
 """
 
 from __future__ import annotations
+
+from math import log, log1p
 
 from peace_ros.core.domain import Camera, Frame, Pose
 from peace_ros.core.mapping.registration import View, small_grey
@@ -18,19 +22,28 @@ _LEAST_SCALE = 0.08
 """Relative change of the height: less is not told apart from errors of the corners."""
 _DOUBT = 0.3
 """Relative difference of the heights from which it is said."""
+_DOUBT_OF_FACTORS = 0.15
+"""The same of the factors by which heights change, where the altitudes were assumed."""
 
 
 class AltitudeCheck:
-    """Follows the frames of a replay."""
+    """Follows the frames of a replay.
 
-    def __init__(self, assumed: Camera) -> None:
-        """Take the camera of frames that come without a calibration."""
+    Args:
+        assumed: The camera of frames that come without a calibration.
+        are_recorded: The altitudes were measured; otherwise the user or a default gave them.
+    """
+
+    def __init__(self, assumed: Camera, *, are_recorded: bool = True) -> None:
         self._assumed = assumed
+        self._are_recorded = are_recorded
         self._last: View | None = None
         self._first_m = 0.0
         self._ratio = 1.0
         self._doubt: tuple[float, float] | None = None
+        self._factors: tuple[float, float, float, float] | None = None
         self._strength = _LEAST_SCALE
+        self._furthest = log1p(_DOUBT_OF_FACTORS)
 
     def add(self, frame: Frame, pose: Pose) -> None:
         """Take a frame and the pose of the camera at its stamp, with the altitude as recorded."""
@@ -44,12 +57,30 @@ class AltitudeCheck:
             return
         self._ratio *= change.ratio
         climbed_m, scale = pose.altitude_agl_m - self._first_m, self._ratio - 1.0
-        if abs(climbed_m) >= _LEAST_CHANGE_M and abs(scale) > self._strength:
+        if not self._are_recorded:
+            self._compare_factors(pose.altitude_agl_m)
+        elif abs(climbed_m) >= _LEAST_CHANGE_M and abs(scale) > self._strength:
             self._strength = abs(scale)
             self._doubt = self._first_m, climbed_m / scale
 
+    def _compare_factors(self, altitude_m: float) -> None:
+        if min(altitude_m, self._first_m) <= 0.0:
+            return
+        told = altitude_m / self._first_m
+        apart = abs(log(told / self._ratio))
+        if apart > self._furthest:
+            self._furthest = apart
+            self._factors = self._first_m, altitude_m, told, self._ratio
+
     def remark(self) -> str | None:
         """Return the doubt, None where there is none or nothing to judge by."""
+        if self._factors is not None:
+            first_m, last_m, told, seen = self._factors
+            return (
+                f'the altitudes are doubtful: from {first_m:.0f} m to {last_m:.0f} m the height '
+                f'changes by the factor {told:.2f}, in the pictures by {seen:.2f}: give a true '
+                '--altitude, or a --log'
+            )
         if self._doubt is None:
             return None
         told_m, seen_m = self._doubt
@@ -59,6 +90,5 @@ class AltitudeCheck:
             return 'the pictures grow where the altitude does: the altitudes do not belong to them'
         return (
             f'the altitudes are doubtful: by the scale of the pictures {told_m:.0f} m are about '
-            f'{seen_m:.0f} m above ground: give --ground {told_m - seen_m:.0f}, or for a video a '
-            'true --altitude'
+            f'{seen_m:.0f} m above ground: give --ground {told_m - seen_m:.0f}'
         )

@@ -122,7 +122,10 @@ class Replayer:
                 continue
             if line is None:
                 line = self._line(taken)
-                altitudes = AltitudeCheck(self._source.options.assumed_camera(*taken.frame.size_px))
+                altitudes = AltitudeCheck(
+                    self._source.options.assumed_camera(*taken.frame.size_px),
+                    are_recorded=self._source.altitudes_are_recorded,
+                )
             last_ns = taken.stamp_ns
             if gap_s := line.skip_gap(taken.stamp_ns):
                 self.report.remarks.append(f'nothing was recorded for {gap_s:.0f} s: left out')

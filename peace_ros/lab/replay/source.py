@@ -61,6 +61,8 @@ class RecordingSource(Protocol):
     """How the camera sits on the vehicle."""
     poses: list[Pose]
     """In the order of their stamps."""
+    altitudes_are_recorded: bool
+    """Otherwise the user or a default gave them."""
     engage_ns: int | None
     """When the recorded landing began; None engages with the first frame."""
     remarks: list[str]
@@ -111,6 +113,7 @@ class VideoSource:
         self._reader = VideoReader(path)
         self.count = _Picker(options).about(self._reader.count)
         self.remarks: list[str] = []
+        self.altitudes_are_recorded = True
         self.poses = self._poses()
         self.remarks += self._reader.remarks
         self.engage_ns: int | None = None
@@ -135,6 +138,7 @@ class VideoSource:
         if log is None and options.altitude is None:
             log = subtitles_of(self.path)
         if log is None:
+            self.altitudes_are_recorded = False
             altitude = options.altitude or DEFAULT_ALTITUDE
             self.remarks.append(
                 f'no altitude was recorded: {altitude} m is assumed, linear (--altitude)'
@@ -151,6 +155,8 @@ class VideoSource:
 
 class BagSource:
     """An image topic, its camera_info, and a pose topic of a bag."""
+
+    altitudes_are_recorded = True
 
     def __init__(self, path: Path, options: SourceOptions) -> None:
         self.path = path

@@ -20,8 +20,8 @@ def eye() -> NadirCamera:
     return NadirCamera(draw_world(3, 160.0, 0.2), CAMERA)
 
 
-def checked(eye: NadirCamera, heights_m, told_m) -> str | None:
-    check = AltitudeCheck(CAMERA)
+def checked(eye: NadirCamera, heights_m, told_m, *, are_recorded=True) -> str | None:
+    check = AltitudeCheck(CAMERA, are_recorded=are_recorded)
     for k, (height, told) in enumerate(zip(heights_m, told_m, strict=True)):
         image, *_ = eye.view(Pose(k, 0.0, 0.0, -height, LEVEL, height))
         check.add(Frame(image, k * SECOND), Pose(k * SECOND, 0.0, 0.0, -told, LEVEL, told))
@@ -46,3 +46,14 @@ def test_true_altitudes_and_flights_that_show_nothing_are_not_doubted(eye, heigh
 
 def test_an_altitude_that_goes_the_other_way_is_said(eye) -> None:
     assert 'do not belong' in checked(eye, DESCENT, DESCENT[::-1])
+
+
+def test_assumed_altitudes_are_compared_by_their_factors_alone(eye) -> None:
+    # Their differences are not true, so that no --ground can be told from them.
+    remark = checked(eye, DESCENT, [100.0, 84.0, 68.0, 52.0, 36.0, 20.0], are_recorded=False)
+    assert 'from 100 m to 20 m' in remark
+    assert 'by the factor 0.20, in the pictures by 0.8' in remark
+    assert '--altitude' in remark
+    assert '--ground' not in remark
+    doubled = [2.0 * each for each in DESCENT]
+    assert checked(eye, DESCENT, doubled, are_recorded=False) is None
