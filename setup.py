@@ -35,6 +35,7 @@ NODES = (
     'segmentation',
     'perception',
     'landing',
+    'recorder',
     'satellite_view',
     'autopilot_sim',
 )
@@ -61,6 +62,7 @@ setup(
     package_data={
         **{f'{NAME}.{folder}': ['**/*'] for folder in SHIPPED},
         f'{NAME}.lab.evaluation.segmentation': ['templates/*.j2'],
+        f'{NAME}.lab.replay': ['templates/*.j2'],
         f'{NAME}.lab.experiment.report': ['templates/*.j2'],
     },
     exclude_package_data={f'{NAME}.config': DATA_LEFT_OUT} if SHIPPED else {},

@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The three nodes on board: ``ros2 launch peace_ros landing.launch.py mavlink:=URL``.
+"""The nodes on board: ``ros2 launch peace_ros landing.launch.py mavlink:=URL``.
 
 ``--show-args`` lists the arguments. Nothing moves before
 ``ros2 service call /landing/engage std_srvs/srv/Trigger``.
@@ -25,6 +25,7 @@ PACKAGE = 'peace_ros'
 PRESETS = sorted(path.stem for path in (config_dir() / 'presets').glob('*.yaml'))
 DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 COMPOSED, SEPARATE = 'perception', ('prompt_generator', 'segmentation')
+RECORDER = 'recorder'
 FAST_DDS = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 RESPAWN_DELAY_S = 2.0
 BOOLEANS = ['true', 'false']
@@ -32,6 +33,7 @@ BOOLEANS = ['true', 'false']
 OF_ALL_NODES = {'use_sim_time': bool, 'autostart': bool}
 """Arguments that are parameters of the nodes, with their types."""
 OF_PERCEPTION = {'image_transport': str}
+OF_RECORDER = {'recordings': str, **OF_PERCEPTION}
 OF_LANDING = {
     'interface': str,
     'mavlink': str,
@@ -58,6 +60,8 @@ ARGUMENTS: tuple[tuple[str, Any, str, list[str] | None], ...] = (
     ('autostart', 'true', 'Configure and activate the nodes; else a lifecycle manager', BOOLEANS),
     ('use_composition', 'false', 'Prompt generator and segmentation in one process', BOOLEANS),
     ('use_respawn', 'false', 'Start a perception node again when it has ended', BOOLEANS),
+    ('record', 'true', 'Record what a replay needs, in a process of its own', BOOLEANS),
+    ('recordings', '', f'Folder of the recordings{_UNSET}', None),
     (
         'discovery_range',
         EnvironmentVariable(DISCOVERY, default_value='LOCALHOST'),
@@ -111,7 +115,7 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
     def create(name: str, arguments: dict[str, type], *, respawn: bool) -> Node:
         chosen = {
             each: given[each] == 'true' if kind is bool else given[each]
-            for each, kind in {**OF_ALL_NODES, **arguments}.items()
+            for each, kind in arguments.items()
             if given[each]
         }
         return Node(
@@ -140,16 +144,21 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
     composed = given['use_composition'] == 'true'
     return [
         *(
-            create(name, OF_PERCEPTION, respawn=respawn)
+            create(name, {**OF_ALL_NODES, **OF_PERCEPTION}, respawn=respawn)
             for name in ((COMPOSED,) if composed else SEPARATE)
         ),
         # Never again by itself: where it engages automatically, it would after a takeover, too.
-        create('landing', OF_LANDING, respawn=False),
+        create('landing', {**OF_ALL_NODES, **OF_LANDING}, respawn=False),
+        *(
+            [create(RECORDER, {'use_sim_time': bool, **OF_RECORDER}, respawn=respawn)]
+            if given['record'] == 'true'
+            else []
+        ),
     ]
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the arguments and the three nodes with the parameters of the preset."""
+    """Return the arguments and the nodes with the parameters of the preset."""
     return LaunchDescription(
         [
             *(

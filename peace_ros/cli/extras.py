@@ -10,13 +10,11 @@ from __future__ import annotations
 from importlib.util import find_spec
 
 EXTRA_OF = {
-    'rosbags': 'simulation',
-    'mcap': 'simulation',
-    'zstandard': 'simulation',
     'rasterio': 'geo',
     'jinja2': 'lab',
     'av': 'video',
     'pyulog': 'logs',
+    'psutil': 'lab',
     'matplotlib': 'simulation',
     'pyarrow': 'experiment',
     'scipy': 'experiment',

@@ -93,7 +93,7 @@ def test_each_module_of_others_is_installed_by_something_that_a_sentence_names()
 @pytest.mark.parametrize(
     ('module', 'command'),
     [
-        ('rosbags.serde', 'pip install ".[simulation]" in the checkout'),
+        ('matplotlib.pyplot', 'pip install ".[simulation]" in the checkout'),
         ('PIL', 'the package pillow is not installed: run pip install pillow'),
         ('cv2', 'the package opencv-python-headless is not installed: run pip install opencv-'),
         ('std_srvs.srv', 'source the setup file of ROS 2 Jazzy (on x86_64 without ROS: run pip'),
@@ -120,10 +120,10 @@ def test_what_is_required_is_looked_for_in_order() -> None:
 @pytest.mark.parametrize(
     ('words', 'modules', 'extra'),
     [
-        ('demo', 'rosbags', 'simulation'),
+        ('demo', 'matplotlib', 'simulation'),
         ('demo', 'rclpy', 'wheels'),
-        ('replay no.mcap', 'rosbags', 'simulation'),
-        ('faults', 'rosbags', 'simulation'),
+        ('replay no.mcap', 'matplotlib', 'simulation'),
+        ('faults', 'matplotlib', 'simulation'),
         ('models export no', 'torch', 'export'),
         ('models export no.onnx --clip clip-small', 'onnx', 'export'),
         ('benchmark --reference --quick', 'torch', 'export'),

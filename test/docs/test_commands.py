@@ -25,7 +25,7 @@ import typer
 
 from peace_ros.cli import main as command_line
 from peace_ros.cli.options import for_typer
-from peace_ros.core.node_parameters import FLYING_NODES, SIMULATOR_NODES, named
+from peace_ros.core.node_parameters import FLYING_NODES, RECORDER, SIMULATOR_NODES, named
 from peace_ros.core.presets import preset_names
 from peace_ros.lab.parameter_docs import NODE_PARAMETERS
 
@@ -175,7 +175,7 @@ def _check_peace(words: tuple[str, ...]) -> None:
 
 def _check_ros(words: tuple[str, ...]) -> None:
     if words[1:3] == ('run', 'peace_ros') and words[3] != 'peace':
-        executables = {name: (name,) for name in (*FLYING_NODES, *SIMULATOR_NODES)}
+        executables = {name: (name,) for name in (*FLYING_NODES, RECORDER, *SIMULATOR_NODES)}
         executables['perception'] = ('prompt_generator', 'segmentation')
         assert words[3] in executables
         known = {key for node in executables[words[3]] for key in named(NODE_PARAMETERS[node])}

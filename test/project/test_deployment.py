@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from peace_ros.core.node_parameters import FLYING_NODES
+from peace_ros.core.node_parameters import FLYING_NODES, RECORDER
 from peace_ros.core.presets import load_preset
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -68,7 +68,7 @@ def test_systemd_accepts_the_units(tmp_path: Path) -> None:
 
 def test_the_target_starts_each_node_and_each_is_restarted() -> None:
     started = re.findall(r'peace_ros@(\w+)\.service', (SYSTEMD / 'peace_ros.target').read_text())
-    assert sorted(started) == sorted(FLYING_NODES)
+    assert sorted(started) == sorted((*FLYING_NODES, RECORDER))
     service = _unit(UNIT)['Service']
     assert service['Restart'] == 'always'
     assert _unit(UNIT)['Unit']['StartLimitIntervalSec'] == '0'
@@ -100,4 +100,4 @@ def test_the_environment_has_what_the_unit_uses() -> None:
 
 def test_the_parameters_of_a_vehicle_are_accepted() -> None:
     preset = load_preset(SYSTEMD / 'vehicle.yaml')
-    assert set(preset.sections) == {f'/**/{node}' for node in FLYING_NODES}
+    assert set(preset.sections) == {f'/**/{node}' for node in (*FLYING_NODES, RECORDER)}

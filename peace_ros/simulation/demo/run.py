@@ -76,6 +76,7 @@ class _Run:
             camera=self.options.camera_options,
             lens=self.options.lens,
             preset=self.preset.path,
+            recordings=self.run_dir / 'recordings',
             speed=self.speed,
             mavlink=self.options.mavlink or f'udpout:127.0.0.1:{port}',
             pose_mavlink=self.options.pose_mavlink,
@@ -171,7 +172,7 @@ def _fly(run: _Run, monitor: Monitor, group: ProcessGroup) -> Ending:
     arguments = node_arguments(run.wiring)
     landing = arguments.pop('landing')
     for name, given in arguments.items():
-        group.start(name, MODULES[name], given)
+        group.start(name, MODULES[name], given, may_end=name == 'recorder')
     if run.options.own_autopilot:
         # Our own autopilot talks to any number of peers; a given one may know only one URL,
         # which the pilot must have left before the landing node can use it.

@@ -25,7 +25,8 @@ import pytest
 from peace_ros.core.landing.drift import Drift
 from peace_ros.lab.replay import run
 from peace_ros.lab.replay.line import Step
-from peace_ros.lab.replay.source import SourceOptions, open_source
+from peace_ros.lab.replay.source import open_source
+from peace_ros.lab.replay.source_options import SourceOptions
 
 DATA = Path(__file__).resolve().parents[2] / 'data'
 STORED = DATA / 'small_digest.npz'
