@@ -280,6 +280,7 @@ class VideoWriter:
         self._partial = path.with_name(f'.{path.stem}.partial{path.suffix}')
         self._writer: cv2.VideoWriter | None = None
         self._size: tuple[int, int] | None = None
+        self._written = 0
 
     def __enter__(self) -> VideoWriter:
         """Return itself; the file is created with the first frame, which gives its size."""
@@ -307,14 +308,32 @@ class VideoWriter:
                 f'video {self.path}: frame of {size} px after ones of {self._size}'
             )
         self._writer.write(cv2.cvtColor(image_rgb, cv2.COLOR_RGB2BGR))
+        self._written += 1
 
     def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
-        """Put the file in its place, or remove it after an error."""
+        """Put the file in its place, or remove it after an error.
+
+        Raises:
+            RecordingError: the file is not whole, such as on a full disk.
+        """
         writer, self._writer = self._writer, None
         if writer is None:
             return
         writer.release()
-        if error_type is None:
-            self._partial.replace(self.path)
-        else:
+        try:
+            if error_type is None:
+                self._check()
+                self._partial.replace(self.path)
+        finally:
             self._partial.unlink(missing_ok=True)
+
+    def _check(self) -> None:
+        """Count the frames in the file: OpenCV gives no error when the disk takes no more."""
+        written = cv2.VideoCapture(str(self._partial))
+        count = round(written.get(cv2.CAP_PROP_FRAME_COUNT)) if written.isOpened() else 0
+        written.release()
+        if count != self._written:
+            raise RecordingError(
+                f'video {self.path} cannot be written, {count} of {self._written} frames are in '
+                'the file: give a folder that has room'
+            )

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import resource
 from fractions import Fraction
 from pathlib import Path
 
@@ -207,3 +208,26 @@ def test_an_assumed_altitude_is_linear_in_time() -> None:
 
 def test_one_altitude_holds_for_the_whole_video() -> None:
     assert AltitudeProfile.parse('60') == AltitudeProfile(60.0, 60.0)
+
+
+def test_a_video_for_which_the_disk_has_no_room_leaves_the_old_one(tmp_path) -> None:
+    path = tmp_path / 'a.mp4'
+    path.write_bytes(b'old')
+    noise = np.random.default_rng(1).integers(0, 256, (40, 120, 160, 3), np.uint8)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def write() -> None:
+        with VideoWriter(path, 5.0) as video:
+            for image in noise:
+                video.write(image)
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
+    try:
+        with pytest.raises(RecordingError, match='of 40 frames are in the file'):
+            write()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [each.name for each in tmp_path.iterdir()] == ['a.mp4']
+    assert path.read_bytes() == b'old'
+    write()
+    assert path.stat().st_size > 100_000
