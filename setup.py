@@ -27,6 +27,7 @@ SHARED = (
     'config/*.xml',
     'config/presets/*.yaml',
     'config/rviz/*.rviz',
+    'config/foxglove/*.json',
     'config/sros2/*.xml',
 )
 
@@ -38,6 +39,7 @@ NODES = (
     'recorder',
     'satellite_view',
     'autopilot_sim',
+    'watch',
 )
 
 
@@ -64,6 +66,7 @@ setup(
         f'{NAME}.lab.evaluation.segmentation': ['templates/*.j2'],
         f'{NAME}.lab.replay': ['templates/*.j2'],
         f'{NAME}.lab.experiment.report': ['templates/*.j2'],
+        f'{NAME}.watch': ['page/*'],
     },
     exclude_package_data={f'{NAME}.config': DATA_LEFT_OUT} if SHIPPED else {},
     data_files=[

@@ -28,21 +28,21 @@ COMPOSED, SEPARATE = 'perception', ('prompt_generator', 'segmentation')
 RECORDER = 'recorder'
 FAST_DDS = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 RESPAWN_DELAY_S = 2.0
-BOOLEANS = ['true', 'false']
+BOOLEANS = ['true', 'false', 'True', 'False']  # both are in use for launch files
 
-OF_ALL_NODES = {'use_sim_time': bool, 'autostart': bool}
-"""Arguments that are parameters of the nodes, with their types."""
-OF_PERCEPTION = {'image_transport': str}
-OF_RECORDER = {'recordings': str, **OF_PERCEPTION}
-OF_LANDING = {
-    'interface': str,
-    'mavlink': str,
-    'dialect': str,
-    'pose_source': str,
-    'tf_parent': str,
-    'tf_child': str,
-    **OF_PERCEPTION,
-}
+OF_ALL_NODES = ('use_sim_time', 'autostart')
+"""Arguments that are parameters of the nodes, apart from the recorder."""
+OF_PERCEPTION = ('image_transport',)
+OF_RECORDER = ('use_sim_time', 'recordings', *OF_PERCEPTION)
+OF_LANDING = (
+    'interface',
+    'mavlink',
+    'dialect',
+    'pose_source',
+    'tf_parent',
+    'tf_child',
+    *OF_PERCEPTION,
+)
 TOPICS = ('image', 'depth', 'pose', 'cmd_vel')
 
 _UNSET = '; empty: as in params_file, or the default of the node'
@@ -98,6 +98,11 @@ def _refuse_unknown(context: LaunchContext) -> None:
 def _create_nodes(context: LaunchContext) -> list[Node]:
     _refuse_unknown(context)
     given: dict[str, str] = context.launch_configurations
+    is_true = {
+        name: given[name].lower() == 'true'
+        for name, *_, choices in ARGUMENTS
+        if choices is BOOLEANS
+    }
     files = [str(config_dir() / 'presets' / f'{given["preset"]}.yaml')]
     if given['params_file']:
         if not Path(given['params_file']).is_file():
@@ -112,12 +117,8 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
         beside = 'camera_info'
     calibration = [(beside, given['camera_info'])] if given['camera_info'] else []
 
-    def create(name: str, arguments: dict[str, type], *, respawn: bool) -> Node:
-        chosen = {
-            each: given[each] == 'true' if kind is bool else given[each]
-            for each, kind in arguments.items()
-            if given[each]
-        }
+    def create(name: str, arguments: tuple[str, ...], *, respawn: bool) -> Node:
+        chosen = {each: is_true.get(each, given[each]) for each in arguments if given[each]}
         return Node(
             package=PACKAGE,
             executable=name,
@@ -140,20 +141,15 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
             },
         )
 
-    respawn = given['use_respawn'] == 'true'
-    composed = given['use_composition'] == 'true'
+    respawn = is_true['use_respawn']
     return [
         *(
-            create(name, {**OF_ALL_NODES, **OF_PERCEPTION}, respawn=respawn)
-            for name in ((COMPOSED,) if composed else SEPARATE)
+            create(name, (*OF_ALL_NODES, *OF_PERCEPTION), respawn=respawn)
+            for name in ((COMPOSED,) if is_true['use_composition'] else SEPARATE)
         ),
         # Never again by itself: where it engages automatically, it would after a takeover, too.
-        create('landing', {**OF_ALL_NODES, **OF_LANDING}, respawn=False),
-        *(
-            [create(RECORDER, {'use_sim_time': bool, **OF_RECORDER}, respawn=respawn)]
-            if given['record'] == 'true'
-            else []
-        ),
+        create('landing', (*OF_ALL_NODES, *OF_LANDING), respawn=False),
+        *([create(RECORDER, OF_RECORDER, respawn=respawn)] if is_true['record'] else []),
     ]
 
 

@@ -80,3 +80,8 @@ def satellite_view() -> Any:
 def autopilot_sim() -> Any:
     """Run the node."""
     return start('peace_ros.simulation.nodes.autopilot_sim')
+
+
+def watch() -> Any:
+    """Run the node."""
+    return start('peace_ros.watch.watch')

@@ -46,7 +46,7 @@ class RasterError(WorldError):
     """An image or label file that cannot be read as it should be."""
 
 
-class Picture(NamedTuple):
+class DecodedPicture(NamedTuple):
     """The pixels of a file as they are stored."""
 
     pixels: NDArray[Any]
@@ -98,7 +98,7 @@ def bytes_of(path: Path) -> bytes:
     return data
 
 
-def decoded(data: bytes, path: Path) -> Picture:
+def decoded(data: bytes, path: Path) -> DecodedPicture:
     """Decode a JPEG, PNG, BMP or WebP of 8 or 16 bits.
 
     Raises:
@@ -108,7 +108,7 @@ def decoded(data: bytes, path: Path) -> Picture:
     try:
         if data[:2] == _JPEG:
             # Other decoders shift what follows a gap, and say no more than a warning.
-            return Picture(simplejpeg.decode_jpeg(data, 'RGB', strict=True), orientation)
+            return DecodedPicture(simplejpeg.decode_jpeg(data, 'RGB', strict=True), orientation)
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except (cv2.error, ValueError) as error:
         reason = error.err if isinstance(error, cv2.error) else error
@@ -117,7 +117,7 @@ def decoded(data: bytes, path: Path) -> Picture:
         raise RasterError(f'{path} is damaged: copy it again, or save it as PNG')
     pixels = np.atleast_3d(np.asarray(image))
     colours = [2, 1, 0, 3][: pixels.shape[2]] if pixels.shape[2] >= 3 else [0, 1][: pixels.shape[2]]
-    return Picture(pixels[..., colours], orientation)
+    return DecodedPicture(pixels[..., colours], orientation)
 
 
 def _examined(data: bytes, path: Path) -> int:

@@ -172,6 +172,13 @@ def test_composed_perception_is_one_process_whose_nodes_keep_their_names(launch)
     assert nodes['perception']['parameters'] == launch()['segmentation']['parameters']
 
 
+@pytest.mark.parametrize('name', ['use_sim_time', 'autostart', 'use_composition', 'use_respawn'])
+def test_booleans_are_taken_in_both_spellings(launch, name):
+    assert launch(f'{name}:=True') == launch(f'{name}:=true')
+    assert launch(f'{name}:=False') == launch(f'{name}:=false')
+    assert launch(f'{name}:=True') != launch(f'{name}:=False')
+
+
 def test_a_landing_that_ended_is_not_started_again(launch):
     respawns = {name: each['respawn'] for name, each in launch('use_respawn:=true').items()}
     assert respawns.pop('landing') is False

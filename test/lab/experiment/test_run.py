@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytest.importorskip('pyarrow')
+
 from peace_ros.core.domain import ConfigurationError, RecordingError
 from peace_ros.lab.experiment import run as running
 from peace_ros.lab.experiment.figures import figures
