@@ -37,6 +37,7 @@ from peace_ros.core.domain import (
 )
 from peace_ros.core.landing import Decision, LandingCore, LandingParameters, State
 from peace_ros.core.mapping import MapParameters
+from peace_ros.recording.run_folder import write_whole
 from peace_ros.simulation.autopilot.estimate_errors import (
     PX4_ERRORS,
     EstimateErrors,
@@ -361,7 +362,9 @@ def main(args: Sequence[str] | None = None) -> int:
         given.seeds, given.wind, given.gust, given.heatmaps, px4_errors=given.px4_errors, tell=True
     )
     if given.json is not None:
-        given.json.write_text(json.dumps([asdict(each) for each in flown], indent=2) + '\n')
+        write_whole(
+            given.json, json.dumps([asdict(each) for each in flown], indent=2) + '\n', 'flights'
+        )
     good = sum(each.is_good for each in flown)
     air = f'wind {given.wind:g} m/s, gusts {given.gust:g} m/s'
     limits = (
