@@ -11,11 +11,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'peace_ros'
-LINES_OF_WHAT_FLIES = 18_065
+LINES_OF_WHAT_FLIES = 18_095
 """Of core and nodes: 14,500, what learns a biased velocity and finds faulty axes, what names the
 cause that stops the vehicle (fence, second commander, failsafe after a silent line), what compares
-heights (also for the safe altitude), what knows lens, mount, shape and encodings of the camera, diagnostics of every input, live
-parameters, managed nodes that may share a process, and what people see."""
+heights (also for the safe altitude), what withdraws a request for a mode, what knows lens, mount,
+shape and encodings of the camera, diagnostics of every input, live parameters, managed nodes that
+may share a process, and what people see."""
 LINES_OF_A_NODE_FILE = 200
 
 
