@@ -11,7 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'peace_ros'
-LINES_OF_WHAT_FLIES = 18_095
+LINES_OF_WHAT_FLIES = 18_100
 """Of core and nodes: 14,500, what learns a biased velocity and finds faulty axes, what names the
 cause that stops the vehicle (fence, second commander, failsafe after a silent line), what compares
 heights (also for the safe altitude), what withdraws a request for a mode, what knows lens, mount,
