@@ -27,6 +27,7 @@ SHARED = (
     'config/*.xml',
     'config/presets/*.yaml',
     'config/rviz/*.rviz',
+    'config/foxglove/*.json',
     'config/sros2/*.xml',
 )
 
@@ -35,8 +36,10 @@ NODES = (
     'segmentation',
     'perception',
     'landing',
+    'recorder',
     'satellite_view',
     'autopilot_sim',
+    'watch',
 )
 
 
@@ -61,7 +64,9 @@ setup(
     package_data={
         **{f'{NAME}.{folder}': ['**/*'] for folder in SHIPPED},
         f'{NAME}.lab.evaluation.segmentation': ['templates/*.j2'],
+        f'{NAME}.lab.replay': ['templates/*.j2'],
         f'{NAME}.lab.experiment.report': ['templates/*.j2'],
+        f'{NAME}.watch': ['page/*'],
     },
     exclude_package_data={f'{NAME}.config': DATA_LEFT_OUT} if SHIPPED else {},
     data_files=[

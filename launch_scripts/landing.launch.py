@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The three nodes on board: ``ros2 launch peace_ros landing.launch.py mavlink:=URL``.
+"""The nodes on board: ``ros2 launch peace_ros landing.launch.py mavlink:=URL``.
 
 ``--show-args`` lists the arguments. Nothing moves before
 ``ros2 service call /landing/engage std_srvs/srv/Trigger``.
@@ -25,22 +25,24 @@ PACKAGE = 'peace_ros'
 PRESETS = sorted(path.stem for path in (config_dir() / 'presets').glob('*.yaml'))
 DISCOVERY = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 COMPOSED, SEPARATE = 'perception', ('prompt_generator', 'segmentation')
+RECORDER = 'recorder'
 FAST_DDS = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 RESPAWN_DELAY_S = 2.0
-BOOLEANS = ['true', 'false']
+BOOLEANS = ['true', 'false', 'True', 'False']  # both are in use for launch files
 
-OF_ALL_NODES = {'use_sim_time': bool, 'autostart': bool}
-"""Arguments that are parameters of the nodes, with their types."""
-OF_PERCEPTION = {'image_transport': str}
-OF_LANDING = {
-    'interface': str,
-    'mavlink': str,
-    'dialect': str,
-    'pose_source': str,
-    'tf_parent': str,
-    'tf_child': str,
-    **OF_PERCEPTION,
-}
+OF_ALL_NODES = ('use_sim_time', 'autostart')
+"""Arguments that are parameters of the nodes, apart from the recorder."""
+OF_PERCEPTION = ('image_transport',)
+OF_RECORDER = ('use_sim_time', 'recordings', *OF_PERCEPTION)
+OF_LANDING = (
+    'interface',
+    'mavlink',
+    'dialect',
+    'pose_source',
+    'tf_parent',
+    'tf_child',
+    *OF_PERCEPTION,
+)
 TOPICS = ('image', 'depth', 'pose', 'cmd_vel')
 
 _UNSET = '; empty: as in params_file, or the default of the node'
@@ -58,6 +60,8 @@ ARGUMENTS: tuple[tuple[str, Any, str, list[str] | None], ...] = (
     ('autostart', 'true', 'Configure and activate the nodes; else a lifecycle manager', BOOLEANS),
     ('use_composition', 'false', 'Prompt generator and segmentation in one process', BOOLEANS),
     ('use_respawn', 'false', 'Start a perception node again when it has ended', BOOLEANS),
+    ('record', 'true', 'Record what a replay needs, in a process of its own', BOOLEANS),
+    ('recordings', '', f'Folder of the recordings{_UNSET}', None),
     (
         'discovery_range',
         EnvironmentVariable(DISCOVERY, default_value='LOCALHOST'),
@@ -94,6 +98,11 @@ def _refuse_unknown(context: LaunchContext) -> None:
 def _create_nodes(context: LaunchContext) -> list[Node]:
     _refuse_unknown(context)
     given: dict[str, str] = context.launch_configurations
+    is_true = {
+        name: given[name].lower() == 'true'
+        for name, *_, choices in ARGUMENTS
+        if choices is BOOLEANS
+    }
     files = [str(config_dir() / 'presets' / f'{given["preset"]}.yaml')]
     if given['params_file']:
         if not Path(given['params_file']).is_file():
@@ -108,12 +117,8 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
         beside = 'camera_info'
     calibration = [(beside, given['camera_info'])] if given['camera_info'] else []
 
-    def create(name: str, arguments: dict[str, type], *, respawn: bool) -> Node:
-        chosen = {
-            each: given[each] == 'true' if kind is bool else given[each]
-            for each, kind in {**OF_ALL_NODES, **arguments}.items()
-            if given[each]
-        }
+    def create(name: str, arguments: tuple[str, ...], *, respawn: bool) -> Node:
+        chosen = {each: is_true.get(each, given[each]) for each in arguments if given[each]}
         return Node(
             package=PACKAGE,
             executable=name,
@@ -136,20 +141,20 @@ def _create_nodes(context: LaunchContext) -> list[Node]:
             },
         )
 
-    respawn = given['use_respawn'] == 'true'
-    composed = given['use_composition'] == 'true'
+    respawn = is_true['use_respawn']
     return [
         *(
-            create(name, OF_PERCEPTION, respawn=respawn)
-            for name in ((COMPOSED,) if composed else SEPARATE)
+            create(name, (*OF_ALL_NODES, *OF_PERCEPTION), respawn=respawn)
+            for name in ((COMPOSED,) if is_true['use_composition'] else SEPARATE)
         ),
         # Never again by itself: where it engages automatically, it would after a takeover, too.
-        create('landing', OF_LANDING, respawn=False),
+        create('landing', (*OF_ALL_NODES, *OF_LANDING), respawn=False),
+        *([create(RECORDER, OF_RECORDER, respawn=respawn)] if is_true['record'] else []),
     ]
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the arguments and the three nodes with the parameters of the preset."""
+    """Return the arguments and the nodes with the parameters of the preset."""
     return LaunchDescription(
         [
             *(

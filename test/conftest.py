@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -13,6 +14,9 @@ import numpy as np
 import pytest
 
 from peace_ros.core.domain import Frame
+
+# A message takes any value otherwise, and sends a float32 of NumPy as zero without an error.
+os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 
 
 def _load_tiny_bundles() -> ModuleType:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import typer
 from rich.console import Console
 
+from peace_ros.cli.extras import require
 from peace_ros.cli.options import with_options
 from peace_ros.simulation.demo.options import DemoOptions
 
@@ -17,6 +18,8 @@ def demo(*, options: DemoOptions) -> None:
 
     Exit status 0 only when it ended over a place that the ground truth does not call unsafe.
     """
+    if options.watch:
+        require('starlette', 'uvicorn', 'websockets')
     from peace_ros.simulation.demo.run import run_demo
 
     raise typer.Exit(run_demo(options, Console()))

@@ -67,6 +67,11 @@ def landing() -> Any:
     return start('peace_ros.nodes.landing')
 
 
+def recorder() -> Any:
+    """Run the node beside those that fly."""
+    return start('peace_ros.recorder.recorder')
+
+
 def satellite_view() -> Any:
     """Run the node."""
     return start('peace_ros.simulation.nodes.satellite_view')
@@ -75,3 +80,8 @@ def satellite_view() -> Any:
 def autopilot_sim() -> Any:
     """Run the node."""
     return start('peace_ros.simulation.nodes.autopilot_sim')
+
+
+def watch() -> Any:
+    """Run the node."""
+    return start('peace_ros.watch.watch')

@@ -7,14 +7,15 @@ Imports nothing that could be missing itself.
 
 from __future__ import annotations
 
+import sys
+import sysconfig
 from importlib.util import find_spec
+from pathlib import Path
 
 EXTRA_OF = {
-    'rosbags': 'simulation',
-    'mcap': 'simulation',
-    'zstandard': 'simulation',
     'rasterio': 'geo',
     'jinja2': 'lab',
+    'psutil': 'lab',
     'matplotlib': 'simulation',
     'pyarrow': 'experiment',
     'scipy': 'experiment',
@@ -27,6 +28,9 @@ EXTRA_OF = {
     'transformers': 'export',
     'safetensors': 'export',
     'onnx': 'export',
+    'starlette': 'watch',
+    'uvicorn': 'watch',
+    'websockets': 'watch',
 }
 """Module -> the extra of setup.cfg that installs its package."""
 PACKAGE_OF = {
@@ -38,7 +42,8 @@ PACKAGE_OF = {
 """Module -> its package on PyPI, where the names differ."""
 ROS_MODULES = frozenset(
     {'rclpy', 'launch', 'launch_ros', 'ament_index_python', 'std_srvs', 'tf2_ros', 'tf2_msgs'}
-    | {f'{name}_msgs' for name in ('sensor', 'std', 'geometry', 'diagnostic', 'rosgraph')}
+    | {f'{name}_msgs' for name in ('sensor', 'std', 'geometry', 'diagnostic', 'rosgraph', 'nav')}
+    | {f'{name}_msgs' for name in ('lifecycle', 'visualization')}
     | {f'{name}_interfaces' for name in ('rcl', 'builtin')}
 )
 
@@ -59,10 +64,21 @@ def how_to_install(error: ModuleNotFoundError) -> str | None:
             'pip install ".[wheels]" in the checkout)'
         )
     elif module in EXTRA_OF:
-        command = f'run pip install ".[{EXTRA_OF[module]}]" in the checkout'
+        command = f'run {_pip_install()} ".[{EXTRA_OF[module]}]" in the checkout'
     else:
-        command = f'run pip install {package}'
+        command = f'run {_pip_install()} {package}'
     return f'the package {package} is not installed: {command}'
+
+
+def _pip_install() -> str:
+    """Return the beginning of the command, which works where the system manages Python (PEP 668).
+
+    That is Ubuntu 24.04 outside of a virtual environment: there pip refuses without the option.
+    """
+    managed = Path(sysconfig.get_path('stdlib')) / 'EXTERNALLY-MANAGED'
+    if sys.prefix == sys.base_prefix and managed.exists():
+        return 'pip install --break-system-packages'
+    return 'pip install'
 
 
 def require(*modules: str) -> None:

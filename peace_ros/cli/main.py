@@ -31,6 +31,7 @@ EXIT_FAILED, EXIT_REFUSED, EXIT_INTERRUPTED = 1, 2, 130
 VERBS = {
     'doctor': 'Check ROS, models, camera, autopilot and computer before a flight.',
     'demo': 'Fly a simulated vehicle from 100 m to 20 m over a place that the nodes choose.',
+    'watch': 'Show a landing on a local web page.',
     'replay': 'Run prompts, segmentation and landing over a recording.',
     'benchmark': 'Time CLIPSeg and FastSAM per frame, beside the ways that others run them.',
     'faults': 'Put every fault into a flight of the real processes, and judge what happens.',

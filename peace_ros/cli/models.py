@@ -77,7 +77,8 @@ def models_warm(
     """Load the networks of a preset and run frames through them.
 
     What a provider builds and keeps, such as the engines of TensorRT, is then there when the nodes
-    start. Exit status 1 when something must be mended.
+    start. Their heatmaps are compared with those of ONNX Runtime on the CPU. Exit status 1 when
+    something must be mended.
     """
     from peace_ros.core.node_parameters import CameraOptions
     from peace_ros.core.presets import load_preset
@@ -89,7 +90,11 @@ def models_warm(
     width_px, height_px = _size(size) if size else (camera.camera_width, camera.camera_height)
     models = Models(preset, provider or (), builds_engines=True)
     failed = False
-    for check in (models.load, lambda: models.time_frame(width_px, height_px)):
+    for check in (
+        models.load,
+        lambda: models.time_frame(width_px, height_px),
+        lambda: models.compare(width_px, height_px),
+    ):
         for each in check():
             typer.echo(f'{each.found}: {each.remedy}' if each.remedy else each.found)
             failed |= each.outcome is CheckResult.MEND

@@ -20,6 +20,8 @@ Group = tuple[str, type[Any]]
 """Prefix of the ROS names (empty for none) and the dataclass behind them."""
 
 FLYING_NODES = ('prompt_generator', 'segmentation', 'landing')
+RECORDER = 'recorder'
+"""The node beside those that fly; it decides nothing."""
 SIMULATOR_NODES = ('satellite_view', 'autopilot_sim')
 """Their parameters are declared where they are, and checked when they start."""
 
@@ -180,8 +182,48 @@ class LandingOptions(ParameterSet):
     )
 
 
+@dataclass(frozen=True)
+class RecorderParameters(ParameterSet):
+    """What the recorder node writes, and where."""
+
+    recordings: str = parameter(
+        '', 'Folder of the recordings; empty: peace_ros in ROS_HOME, or else in ~/.ros'
+    )
+    image_transport: str = parameter(
+        'raw', 'Take image (raw) or image/compressed (JPEG, PNG)', choices=_TRANSPORTS
+    )
+    image_rate: float = parameter(
+        5.0,
+        'Most frames and heatmaps per second during a landing; otherwise one in 5 s',
+        unit='Hz',
+        low=0.1,
+        high=60.0,
+    )
+    image_quality: int = parameter(90, 'JPEG quality of raw images', low=30, high=100)
+    file_mb: int = parameter(1000, 'A new file begins at this size', unit='MB', low=1, high=100_000)
+    total_mb: int = parameter(
+        8000,
+        'Bound of all files together: the oldest are removed',
+        unit='MB',
+        low=2,
+        high=10_000_000,
+    )
+    least_free_mb: int = parameter(
+        500, 'Nothing is recorded while less than this is free on the disk', unit='MB', low=0
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse a bound in which no file has room."""
+        super().__post_init__()
+        if self.total_mb < 2 * self.file_mb:
+            raise ConfigurationError(
+                f'parameter total_mb = {self.total_mb}: give at least twice file_mb '
+                f'({self.file_mb}), or a smaller file_mb'
+            )
+
+
 def groups_of(node: str) -> tuple[Group, ...]:
-    """Return the groups of parameters of one of :data:`FLYING_NODES`.
+    """Return the groups of parameters of one of :data:`FLYING_NODES`, or of the recorder.
 
     Imports are made here: a node shall not load the libraries of the others.
     """
@@ -213,6 +255,8 @@ def groups_of(node: str) -> tuple[Group, ...]:
             ('vehicle', VehicleParameters),
             ('sender', SenderParameters),
         )
+    if node == RECORDER:
+        return (('', RecorderParameters),)
     raise ConfigurationError(f'node {node!r} is unknown: choose one of {", ".join(FLYING_NODES)}')
 
 

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,6 +14,7 @@ from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.domain.parameters import describe
 from peace_ros.core.node_parameters import (
     FLYING_NODES,
+    RECORDER,
     SIMULATOR_NODES,
     converted,
     groups_of,
@@ -27,6 +29,7 @@ from peace_ros.core.segmentation import SegmentationParameters, family_of
 from peace_ros.core.yaml_files import WILDCARDS, Sections, read_sections
 
 DEFAULT_PRESET = 'peace_cs'
+_CHECKED = (*FLYING_NODES, RECORDER)
 _Parameters = TypeVar('_Parameters')
 
 
@@ -73,6 +76,14 @@ class Preset:
                 values.update(given)
         return values
 
+    def with_values(self, node: str, given: Mapping[str, Any]) -> Preset:
+        """Return the preset with other values for a node: those go before the ones of the file."""
+        known = named(groups_of(node))
+        own = {name: value for name, value in self._values_for(node).items() if name in known}
+        section = f'/**/{node}'
+        others = {name: values for name, values in self.sections.items() if name != section}
+        return replace(self, sections={**others, section: {**own, **given}})
+
     def check(self) -> None:
         """Refuse what a node would refuse.
 
@@ -80,10 +91,10 @@ class Preset:
             ConfigurationError: a node or parameter is unknown, or a value cannot be used.
 
         """
-        known = {node: named(groups_of(node)) for node in FLYING_NODES}
+        known = {node: named(groups_of(node)) for node in _CHECKED}
         for section, values in self.sections.items():
             node = _node_of(section)
-            if section not in WILDCARDS and node not in (*FLYING_NODES, *SIMULATOR_NODES):
+            if section not in WILDCARDS and node not in (*_CHECKED, *SIMULATOR_NODES):
                 raise _unknown_section(self.path, section)
             for name in values:
                 if is_of_ros(name) or node in SIMULATOR_NODES:
@@ -96,7 +107,7 @@ class Preset:
                         raise unknown_name(name, node, known[node])
                 except ConfigurationError as error:
                     raise ConfigurationError(f'{self.path}: {error}') from error
-        for node in FLYING_NODES:
+        for node in _CHECKED:
             for _, parameters in groups_of(node):
                 self.fill(node, parameters)
         family_of(self.fill('segmentation', SegmentationParameters))
@@ -137,7 +148,7 @@ def _node_of(section: str) -> str:
 
 
 def _unknown_section(path: Path, section: str) -> ConfigurationError:
-    names = (*FLYING_NODES, *SIMULATOR_NODES)
+    names = (*_CHECKED, *SIMULATOR_NODES)
     near = get_close_matches(section.rpartition('/')[2], names, n=1)
     remedy = f'did you mean {near[0]}?' if near else f'choose among {", ".join(names)}, /**'
     return ConfigurationError(f'{path}: node {section} is unknown: {remedy}')

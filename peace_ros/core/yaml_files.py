@@ -96,6 +96,18 @@ def read_yaml(path: Path, remedy: str) -> Any:
         raise ConfigurationError(f'{path}: not usable YAML ({error}); {remedy}') from error
 
 
+def value_of(text: str) -> Any:
+    """Return the value that ROS reads from ``-p name:=text``.
+
+    Raises:
+        ConfigurationError: the text is no YAML.
+    """
+    try:
+        return yaml.load(text, Loader=_Loader)  # noqa: S506 (a SafeLoader)
+    except _DAMAGE as error:
+        raise ConfigurationError(f'value {text!r} is no YAML ({error}): quote texts') from error
+
+
 def read_sections(path: Path) -> Sections:
     """Return the sections of a ROS parameter file; groups of parameters become dotted names.
 

@@ -17,14 +17,16 @@ from typing import Any
 import yaml
 
 from peace_ros.core.domain.parameters import ParameterInfo, describe
-from peace_ros.core.node_parameters import FLYING_NODES, Group, groups_of, named
+from peace_ros.core.node_parameters import FLYING_NODES, RECORDER, Group, groups_of, named
 from peace_ros.simulation.nodes.options import AUTOPILOT_SIM, SATELLITE_VIEW
+from peace_ros.watch.options import WATCH
 
 NODE_PARAMETERS: Mapping[str, tuple[Group, ...]] = MappingProxyType(
     {
-        **{node: groups_of(node) for node in FLYING_NODES},
+        **{node: groups_of(node) for node in (*FLYING_NODES, RECORDER)},
         'satellite_view': SATELLITE_VIEW,
         'autopilot_sim': AUTOPILOT_SIM,
+        'watch': WATCH,
     }
 )
 """Node -> its groups of parameters."""

@@ -14,7 +14,8 @@ from peace_ros.core.threads import GuardedThread, OnDefect
 from peace_ros.core.vehicle import VehicleLink
 
 _RETRY_S = 1.0
-_JOIN_S = 1.0
+_JOIN_S = 0.2
+"""For one that waits for a HEARTBEAT, which it may do for seconds: it ends with the process."""
 
 
 def newest_telemetry(link: VehicleLink | None) -> tuple[Telemetry | None, float]:

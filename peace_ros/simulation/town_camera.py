@@ -12,6 +12,7 @@ from __future__ import annotations
 from itertools import product
 from math import log2
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,7 +22,7 @@ from peace_ros.simulation.drawing.town import MIXED, Town, tiles_of
 from peace_ros.simulation.world import World, check_drawn
 
 _LEVELS = 3
-_TILE_PX = 500
+_TILE_PX = 250
 _FINEST_WITHIN_M = 15.0
 """Ground truth of a circle up to this radius comes from the finest level."""
 
@@ -77,7 +78,8 @@ class TownCamera(NadirCamera):
         level = self._clipped(round(log2(max(radius_m / _FINEST_WITHIN_M, 1.0))))
         place = np.array(self.world.pixel(north_m, east_m))
         reach = np.full(2, radius_m / self.world.gsd_m)
-        self._ground(level, np.stack([place - reach, place + reach]))
+        square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        self._ground(level, place + square * reach)
         column, row = ((place + 0.5) / 2**level - 0.5).tolist()
         gsd_m = self.world.gsd_m * 2**level
         return label_square(self._labels[level], (column, row), radius_m, gsd_m)
@@ -86,14 +88,7 @@ class TownCamera(NadirCamera):
         level = self._clipped(level)
         labels, image = self._labels[level], self._levels[level]
         tiles = tiles_of(labels.shape[0], _TILE_PX)
-        at = corners_px / 2**level
-        spans = zip(np.floor(at.min(axis=0)), np.ceil(at.max(axis=0)), strict=True)
-        # Beyond its edge the world is continued by mirroring: the tiles there are inner ones.
-        columns, rows = (
-            np.unique(mirrored(np.arange(low - 1, high + 2), labels.shape[0]) // _TILE_PX)
-            for low, high in spans
-        )
-        for row, column in product(rows.tolist(), columns.tolist()):
+        for row, column in tiles_in_view(corners_px / 2**level, labels.shape[0]):
             if (level, row, column) not in self._drawn:
                 where = (tiles[row], tiles[column])
                 image[where], labels[where] = self._town.draw(*where, self.world.gsd_m * 2**level)
@@ -102,3 +97,29 @@ class TownCamera(NadirCamera):
 
     def _clipped(self, level: int) -> int:
         return min(max(level, 0), _LEVELS - 1)
+
+
+def tiles_in_view(seen_px: NDArray[np.float64], size_px: int) -> list[tuple[int, int]]:
+    """Return row and column of each tile that a view touches.
+
+    Args:
+        seen_px: points in view (N, 2: column, row); what lies between them is in view too.
+        size_px: side of the world.
+    """
+    low, high = np.floor(seen_px.min(axis=0)) - 1, np.ceil(seen_px.max(axis=0)) + 1
+    # Beyond its edge the world is continued by mirroring: the tiles there are inner ones.
+    columns, rows = (
+        np.unique(mirrored(np.arange(first, last + 1), size_px) // _TILE_PX).tolist()
+        for first, last in zip(low, high, strict=True)
+    )
+    found = list(product(rows, columns))
+    if low.min() < 0.0 or high.max() >= size_px:
+        return found
+    hull = cv2.convexHull(seen_px.astype(np.float32))
+    box = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32) * (0.5 * _TILE_PX + 1.0)
+
+    def is_seen(row: int, column: int) -> bool:
+        middle = (np.array([column, row], np.float32) + 0.5) * _TILE_PX
+        return cv2.intersectConvexConvex(hull, box + middle)[0] > 0.0
+
+    return [each for each in found if is_seen(*each)]

@@ -9,6 +9,7 @@ import configparser
 import re
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 import pytest
@@ -93,16 +94,41 @@ def test_each_module_of_others_is_installed_by_something_that_a_sentence_names()
 @pytest.mark.parametrize(
     ('module', 'command'),
     [
-        ('rosbags.serde', 'pip install ".[simulation]" in the checkout'),
+        ('matplotlib.pyplot', 'pip install ".[simulation]" in the checkout'),
         ('PIL', 'the package pillow is not installed: run pip install pillow'),
         ('cv2', 'the package opencv-python-headless is not installed: run pip install opencv-'),
         ('std_srvs.srv', 'source the setup file of ROS 2 Jazzy (on x86_64 without ROS: run pip'),
+        ('lifecycle_msgs.msg', 'source the setup file of ROS 2 Jazzy'),
     ],
 )
 def test_the_sentence_names_the_command(module: str, command: str) -> None:
     sentence = how_to_install(ModuleNotFoundError(name=module))
     assert sentence is not None
     assert command in sentence
+
+
+def test_every_ros_package_of_package_xml_is_one_that_no_pip_command_installs() -> None:
+    text = (ROOT / 'package.xml').read_text()
+    named = set(re.findall(r'<exec_depend>(\w+(?:_msgs|_interfaces|_srvs)|rclpy)<', text))
+    assert {'rclpy', 'std_srvs', 'nav_msgs'} <= named
+    assert named <= ROS_MODULES
+
+
+@pytest.mark.parametrize(
+    ('in_venv', 'marked', 'option'),
+    [(False, True, True), (True, True, False), (False, False, False)],
+)
+def test_where_the_system_manages_python_the_command_has_the_option_that_pip_wants(
+    in_venv, marked, option, tmp_path, monkeypatch
+) -> None:
+    if marked:
+        (tmp_path / 'EXTERNALLY-MANAGED').write_text('[externally-managed]\n')
+    monkeypatch.setattr(sysconfig, 'get_path', lambda _name: str(tmp_path))
+    monkeypatch.setattr(sys, 'base_prefix', '/usr')
+    monkeypatch.setattr(sys, 'prefix', '/venv' if in_venv else '/usr')
+    for module, what in (('tokenizers', 'tokenizers'), ('rasterio', '".[geo]"')):
+        sentence = how_to_install(ModuleNotFoundError(name=module))
+        assert f'pip install {"--break-system-packages " * option}{what}' in sentence
 
 
 @pytest.mark.parametrize('name', ['peace_ros.core.lost', None])
@@ -120,10 +146,10 @@ def test_what_is_required_is_looked_for_in_order() -> None:
 @pytest.mark.parametrize(
     ('words', 'modules', 'extra'),
     [
-        ('demo', 'rosbags', 'simulation'),
+        ('demo', 'matplotlib', 'simulation'),
         ('demo', 'rclpy', 'wheels'),
-        ('replay no.mcap', 'rosbags', 'simulation'),
-        ('faults', 'rosbags', 'simulation'),
+        ('replay no.mcap', 'matplotlib', 'simulation'),
+        ('faults', 'matplotlib', 'simulation'),
         ('models export no', 'torch', 'export'),
         ('models export no.onnx --clip clip-small', 'onnx', 'export'),
         ('benchmark --reference --quick', 'torch', 'export'),

@@ -121,3 +121,19 @@ def test_what_a_node_would_refuse_is_refused_in_one_sentence(write, text, words)
 def test_a_preset_that_does_not_exist_names_those_that_do():
     with pytest.raises(ConfigurationError, match='peace_cs'):
         load_preset('no_such')
+
+
+def test_other_values_go_before_those_of_every_section(write):
+    path = write(
+        section('/**', 'use_sim_time: true')
+        + section('landing', 'safety_threshold: 0.75')
+        + section('/**/segmentation', 'template: DD')
+    )
+    preset = load_preset(path)
+    changed = preset.with_values('landing', {'safety_threshold': 0.9})
+    changed.check()
+    assert changed.fill('landing', LandingParameters).safety_threshold == 0.9
+    assert preset.fill('landing', LandingParameters).safety_threshold == 0.75
+    assert changed.sections['/**/segmentation'] == {'template': 'DD'}
+    with pytest.raises(ConfigurationError, match='did you mean safety_threshold'):
+        preset.with_values('landing', {'safety_treshold': 0.7}).check()

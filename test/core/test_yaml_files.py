@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from peace_ros.core.domain import ConfigurationError
-from peace_ros.core.yaml_files import read_sections, read_yaml
+from peace_ros.core.yaml_files import read_sections, read_yaml, value_of
 
 DATA = Path(__file__).resolve().parents[1] / 'data'
 AS_ROS = {
@@ -116,3 +116,12 @@ def test_a_section_that_holds_itself_is_refused(tmp_path, text):
     path.write_text(text)
     with pytest.raises(ConfigurationError, match='not usable YAML'):
         read_sections(path)
+
+
+def test_a_single_value_is_read_as_on_the_command_line():
+    assert value_of('0.7') == 0.7
+    assert value_of('y') is True
+    assert value_of('[a, 1:30]') == ['a', '1:30']
+    assert value_of("'0.7'") == '0.7'
+    with pytest.raises(ConfigurationError, match='no YAML'):
+        value_of('[a')

@@ -87,18 +87,30 @@ def launch(monkeypatch) -> Callable[..., dict[str, dict[str, Any]]]:
     return StandIn(monkeypatch).launch
 
 
-def test_starts_the_three_nodes_on_board(launch):
+def test_starts_the_nodes_on_board(launch):
     nodes = launch()
-    assert list(nodes) == ['prompt_generator', 'segmentation', 'landing']
+    assert list(nodes) == ['prompt_generator', 'segmentation', 'landing', 'recorder']
     assert all(each['package'] == 'peace_ros' for each in nodes.values())
     assert all(each['name'] == executable for executable, each in nodes.items())
 
 
 def test_by_default_the_preset_decides_and_nothing_goes_before_it(launch):
-    for node in launch().values():
+    for name, node in launch().items():
         path, given = node['parameters']
         assert path == str(config_dir() / 'presets' / 'peace_cs.yaml')
-        assert given == {'use_sim_time': False, 'autostart': True}
+        managed = {} if name == 'recorder' else {'autostart': True}
+        assert given == {'use_sim_time': False, **managed}
+
+
+def test_the_recorder_is_told_where_to_write_and_may_be_left_out(launch):
+    nodes = launch('recordings:=/data', 'image_transport:=compressed')
+    assert nodes['recorder']['parameters'][-1] == {
+        'use_sim_time': False,
+        'recordings': '/data',
+        'image_transport': 'compressed',
+    }
+    assert 'recordings' not in nodes['landing']['parameters'][-1]
+    assert list(launch('record:=false')) == ['prompt_generator', 'segmentation', 'landing']
 
 
 def test_a_parameter_file_goes_before_the_preset_and_an_argument_before_both(launch, tmp_path):
@@ -146,6 +158,7 @@ def test_every_argument_changes_what_is_started(launch, tmp_path):
         'use_composition': 'true',
         'use_respawn': 'true',
         'discovery_range': 'SUBNET',
+        'record': 'false',
     }
     usual = launch()
     for name, *_ in load().ARGUMENTS:
@@ -154,14 +167,22 @@ def test_every_argument_changes_what_is_started(launch, tmp_path):
 
 def test_composed_perception_is_one_process_whose_nodes_keep_their_names(launch):
     nodes = launch('use_composition:=true')
-    assert list(nodes) == ['perception', 'landing']
+    assert list(nodes) == ['perception', 'landing', 'recorder']
     assert nodes['perception']['name'] is None
     assert nodes['perception']['parameters'] == launch()['segmentation']['parameters']
 
 
+@pytest.mark.parametrize('name', ['use_sim_time', 'autostart', 'use_composition', 'use_respawn'])
+def test_booleans_are_taken_in_both_spellings(launch, name):
+    assert launch(f'{name}:=True') == launch(f'{name}:=true')
+    assert launch(f'{name}:=False') == launch(f'{name}:=false')
+    assert launch(f'{name}:=True') != launch(f'{name}:=False')
+
+
 def test_a_landing_that_ended_is_not_started_again(launch):
     respawns = {name: each['respawn'] for name, each in launch('use_respawn:=true').items()}
-    assert respawns == {'prompt_generator': True, 'segmentation': True, 'landing': False}
+    assert respawns.pop('landing') is False
+    assert respawns == {'prompt_generator': True, 'segmentation': True, 'recorder': True}
 
 
 def test_discovery_stays_on_the_machine(launch):

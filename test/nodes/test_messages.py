@@ -9,7 +9,7 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Point, PoseStamped
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
@@ -180,3 +180,8 @@ def test_a_twist_goes_along_the_image(heading_deg, forward, left):
 def test_a_site_is_a_point_on_the_ground():
     message = messages.site_to_message(Site(3.0, 4.0, 8.0, 200.0, 0.9, 0.1), STAMP, 1.5)
     assert (message.point.x, message.point.y, message.point.z) == (4.0, 3.0, -1.5)
+
+
+def test_the_tests_refuse_a_message_field_of_another_type() -> None:
+    with pytest.raises(AssertionError, match='float'):
+        Point().x = np.float32(1.5)

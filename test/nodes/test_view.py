@@ -24,7 +24,8 @@ ROOT = FilePath(__file__).resolve().parents[2]
 def test_the_grid_grows_to_the_east_and_to_the_north():
     score = np.array([[1.0, 0.0, 0.25], [0.0, 0.0, 0.9]], np.float32)
     age_s = np.array([[0.1, 0.1, 0.1], [np.inf, 0.1, 0.1]], np.float32)
-    layers = MapLayers(score, age_s, np.ones((2, 3), np.uint16), 0.5, south_m=-4.0, west_m=7.0)
+    looks, never = np.ones((2, 3), np.uint16), np.full((2, 3), np.inf, np.float32)
+    layers = MapLayers(score, age_s, looks, 0.5, -4.0, 7.0, never)
     grid = grid_message(layers, 1_500_000_000, up_m=2.0)
     assert (grid.info.width, grid.info.height, grid.info.resolution) == (3, 2, 0.5)
     origin = grid.info.origin.position

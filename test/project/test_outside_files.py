@@ -20,6 +20,7 @@ SCHEMAS = {
 
 
 def _check(schema: str, path: Path) -> subprocess.CompletedProcess[str]:
+    pytest.importorskip('check_jsonschema', reason='comes with the extra test')
     return subprocess.run(
         [sys.executable, '-m', 'check_jsonschema', '--builtin-schema', f'vendor.{schema}', path],
         capture_output=True,
@@ -52,6 +53,7 @@ def test_the_workflow_runs_what_every_machine_runs() -> None:
 
 
 def test_commit_hooks_run_tools_of_the_environment() -> None:
+    pytest.importorskip('mypy', reason='comes with the extra test')
     hooks = [
         hook
         for repo in yaml.safe_load((ROOT / '.pre-commit-config.yaml').read_text())['repos']

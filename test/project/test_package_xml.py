@@ -21,6 +21,7 @@ KEY_OF = {
     'opencv-python-headless': 'python3-opencv',
     'onnxruntime': 'python3-onnxruntime-pip',
     'pymavlink': 'python3-pymavlink-pip',
+    'simplejpeg': 'python3-simplejpeg-pip',
     'PyYAML': 'python3-yaml',
     'pillow': 'python3-pil',
     'typer': 'python3-typer',
@@ -31,12 +32,13 @@ KEY_OF = {
     'matplotlib': 'python3-matplotlib',
     'rasterio': 'python3-rasterio',
     'jinja2': 'python3-jinja2',
+    'psutil': 'python3-psutil',
     'pytest': 'python3-pytest',
     'pytest-xdist': 'python3-pytest-xdist',
     'hypothesis': 'python3-hypothesis',
 }
 """Package on PyPI -> its key in rosdistro's rosdep/python.yaml."""
-WITHOUT_KEY = ('tokenizers', 'ftfy', 'mcap', 'simplejpeg')
+WITHOUT_KEY = ('tokenizers', 'ftfy', 'mcap')
 BROUGHT_BY = {'zstandard': 'mcap'}
 
 

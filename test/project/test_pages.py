@@ -18,6 +18,7 @@ LOADED = re.compile(r'<(?:script|img|link|iframe)\b[^>]*?\b(?:src|href)="?(?:htt
 
 @pytest.fixture(scope='module')
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip('mkdocs', reason='comes with the extra docs')
     folder = tmp_path_factory.mktemp('site')
     built = subprocess.run(
         [sys.executable, '-m', 'mkdocs', 'build', '--strict', '--site-dir', str(folder)],

@@ -8,8 +8,12 @@ import pytest
 
 from peace_ros.core.domain import Camera, Label, Pose, WorldError
 from peace_ros.simulation.camera import NadirCamera
-from peace_ros.simulation.drawing.town import DISTRICTS
-from peace_ros.simulation.town_camera import TownCamera
+from peace_ros.simulation.drawing.light import Sun
+from peace_ros.simulation.drawing.plan_index import PlanIndex
+from peace_ros.simulation.drawing.scene import Look, render
+from peace_ros.simulation.drawing.town import DISTRICTS, Town, plan_town
+from peace_ros.simulation.drawing.window import DrawnWindow
+from peace_ros.simulation.town_camera import TownCamera, tiles_in_view
 from peace_ros.simulation.world import draw_world
 
 CAMERA = Camera.from_degrees(96, 96, 73)
@@ -106,3 +110,41 @@ def test_unknown_districts_are_refused():
         draw_world(1, 60.0, 0.5, 'moon')
     with pytest.raises(WorldError, match=r"season 'monsoon'"):
         draw_world(1, 60.0, 0.5, 'suburb', 'monsoon')
+
+
+@pytest.mark.parametrize('gsd_m', [0.1, 0.4])
+def test_a_part_looks_as_it_does_within_a_larger_one(gsd_m):
+    drawn = Town(7, 300.0)
+    image, labels = drawn.draw(slice(100, 500), slice(200, 600), gsd_m)
+    inner_image, inner_labels = drawn.draw(slice(220, 340), slice(300, 420), gsd_m)
+    same = (slice(120, 240), slice(100, 220))
+    assert np.mean(labels[same] != inner_labels) < 1e-3
+    # Only the noise of the pixels differs.
+    smooth, inner_smooth = (
+        cv2.GaussianBlur(each.astype(np.float32), (0, 0), 3.0)
+        for each in (image[same], inner_image)
+    )
+    assert np.abs(smooth - inner_smooth)[12:-12, 12:-12].max() < 4.0
+
+
+def test_what_cannot_show_in_a_window_is_left_out_without_a_trace():
+    rng = np.random.Generator(np.random.PCG64(3))
+    plan = plan_town(rng, 'summer', 200.0)
+    sun, look = Sun(1.0, 0.9, 0.9), Look.draw(rng)
+    window = DrawnWindow(-30.0, -20.0, 150, 120, 0.4)
+    reduced = PlanIndex(plan).within(window)
+    assert 0 < len(reduced.things) < 0.5 * len(plan.things)
+    whole, part = (render(each, window, 3, sun, look) for each in (plan, reduced))
+    assert np.array_equal(whole.labels, part.labels)
+    assert np.array_equal(whole.rgb, part.rgb)
+    assert np.array_equal(whole.height_m, part.height_m)
+
+
+def test_a_turned_view_needs_only_the_tiles_that_it_touches():
+    middle, reach = 1000.0, 750.0
+    corners = middle + reach * np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
+    needed = set(tiles_in_view(corners, 2000))
+    assert not {(1, 1), (1, 6), (6, 1), (6, 6)} & needed
+    grid = np.stack(np.meshgrid(np.arange(0, 2000, 10.0), np.arange(0, 2000, 10.0)), axis=-1)
+    inside = np.abs(grid - middle).sum(axis=-1) < reach
+    assert {(int(y) // 250, int(x) // 250) for x, y in grid[inside]} <= needed

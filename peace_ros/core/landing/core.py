@@ -167,6 +167,7 @@ class LandingCore:
             counts=dict(self._intake.counts),
             failed_sites=self._lookout.failed_sites,
             attempts=self._helm.attempts,
+            refused=self._lookout.refused,
         )
 
     def _height_reports(

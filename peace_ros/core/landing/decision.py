@@ -50,6 +50,19 @@ class Focus:
 
 
 @dataclass(frozen=True)
+class RefusedPlace:
+    """A place where no site is chosen, and the first condition that it does not meet."""
+
+    north_m: float
+    east_m: float
+    clearance_m: float
+    """Distance to ground that was never seen, or is more likely unsafe than safe."""
+    distance_m: float
+    """From the point below the vehicle."""
+    reason: str
+
+
+@dataclass(frozen=True)
 class Decision:
     """Result of one step, for the vehicle, the status topic and the display."""
 
@@ -78,6 +91,8 @@ class Decision:
     """Descents that failed."""
     heights_m: Mapping[str, float] = field(default_factory=dict)
     """Height above ground by each source that the altitude was compared with."""
+    refused: tuple[RefusedPlace, ...] = ()
+    """The best places that are no sites, the best first."""
     relaxed: bool = False
     """The threshold has sunk below safety_threshold, which only relaxation allows."""
 

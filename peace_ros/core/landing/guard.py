@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 from math import copysign, hypot, isfinite
 
-from peace_ros.core.domain import Setpoint
+from peace_ros.core.domain import Pose, Setpoint
 from peace_ros.core.landing.parameters import CELL_SCORE_FLOOR, LandingParameters
 from peace_ros.core.landing.situation import Situation
 
@@ -57,24 +57,35 @@ class Guard:
         return wish, ''
 
     def _descent(self, wish: Setpoint, given: Situation) -> tuple[Setpoint, str]:
-        """Down only within the clearance of a SITE, on ground that the map has just seen safe."""
+        """Down only within the clearance of a SITE, on ground that the map has just seen safe.
+
+        A search may also go down to its floor, above the safe altitude.
+        """
         p, pose, seen = self._p, given.pose, given.sighting
         site = seen.verdict.site
         if wish.v_down_m_s <= 0.0 or pose is None:
             return wish, ''
         if not seen.map_age_s <= p.descent_heatmap_age_limit_s:
             problem = 'the map is old'
+        elif not pose.altitude_agl_m <= p.altitude_limit_m:
+            problem = 'the altitude is not valid'
+        elif self._above_search_floor(pose, given):
+            return wish, ''
         elif site is None or not site.distance_m(pose) + p.safety_radius_m <= site.clearance_m:
             problem = 'no site under the vehicle'
         elif not seen.ground_score >= CELL_SCORE_FLOOR:
             problem = 'the ground below is not safe'
         elif not seen.ground_age_s <= p.descent_heatmap_age_limit_s:
             problem = 'the ground below is not in view'
-        elif not pose.altitude_agl_m <= p.altitude_limit_m:
-            problem = 'the altitude is not valid'
         else:
             return wish, ''
         return replace(wish, v_down_m_s=0.0), f'descent stopped: {problem}'
+
+    def _above_search_floor(self, pose: Pose, given: Situation) -> bool:
+        if given.search_floor_m is None:
+            return False
+        lowest_m = pose.altitude_agl_m - given.above_lowest_m
+        return lowest_m > max(given.search_floor_m, self._p.safe_altitude_m)
 
     def _floor(self, wish: Setpoint, given: Situation) -> tuple[Setpoint, str]:
         if given.pose is None:

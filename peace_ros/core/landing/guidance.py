@@ -18,6 +18,8 @@ _FLOOR_GAIN = 0.6
 stops above the floor with it."""
 _CREEP_M_S = 0.3
 _HIGHEST_SEARCH_M = 120.0
+_NEAR_M = 1.0
+"""Of the altitude of the search."""
 _Wish = tuple[tuple[float, float, float], str]
 """Speed to the north, to the east and down, and what motion waits for."""
 _STAND = (0.0, 0.0, 0.0)
@@ -132,18 +134,38 @@ def _climb(_pose: Pose, _situation: Situation, parameters: LandingParameters) ->
 
 
 def _search(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wish:
-    """Look from higher up, then from elsewhere; only where lateral motion meets no obstacle."""
+    """Look from where the landing began, from elsewhere, and then from lower down.
+
+    All of it where lateral motion meets no obstacle.
+    """
     p = parameters
     safe = at_safe_altitude(pose, p, situation.above_lowest_m)
     if not safe or situation.site is not None:
         return _STAND, 'looking'
     begun_m = (situation.home or pose).altitude_agl_m
-    missing_m = min(begun_m, _HIGHEST_SEARCH_M) - pose.altitude_agl_m
-    up = min(p.z_speed_climbing, 0.5 * missing_m) if missing_m > 1.0 else 0.0
+    down = _to_altitude(pose, situation, min(begun_m, _HIGHEST_SEARCH_M), p)
     if situation.search_target is None:
-        return (0.0, 0.0, -up), 'looking'
+        return (0.0, 0.0, down), 'looking'
     north, east = _towards(pose, *situation.search_target, p.gain, p.search_speed)
-    return (north, east, -up), 'flying an expanding square'
+    note = 'flying an expanding square'
+    return (north, east, down), f'{note} lower down' if situation.search_floor_m else note
+
+
+def _to_altitude(
+    pose: Pose, situation: Situation, begun_m: float, parameters: LandingParameters
+) -> float:
+    """Return the speed down to the altitude of the search; within a metre of it none."""
+    p, floor_m = parameters, situation.search_floor_m
+    wanted_m = begun_m if floor_m is None else min(begun_m, floor_m)
+    missing_m = wanted_m - pose.altitude_agl_m
+    if missing_m > _NEAR_M:
+        return -min(p.z_speed_climbing, 0.5 * missing_m)
+    if floor_m is None:
+        return 0.0
+    room_m = pose.altitude_agl_m - situation.above_lowest_m - floor_m
+    if room_m <= _NEAR_M:
+        return 0.0
+    return min(0.5 * _descent_speed(pose.altitude_agl_m, p), 0.5 * room_m)
 
 
 def _return(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wish:

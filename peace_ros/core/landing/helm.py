@@ -132,7 +132,11 @@ class Helm:
         if self._engaged:
             self._keep_books(situation, telemetry, bad_data)
         self._advance(situation, self._events(situation, bad_data, heights.may_hand_over))
-        situation = replace(situation, search_target=self._search_target(situation))
+        situation = replace(
+            situation,
+            search_target=self._search_target(situation),
+            search_floor_m=self._search_floor_m(),
+        )
         wish, note = velocity(self.state, situation, p)
         # What a fence takes from the speed is no drift.
         fenced = telemetry is not None and telemetry.fence != ''
@@ -201,6 +205,7 @@ class Helm:
             bad_data=bad_data,
             site_known=site is not None,
             warmed_up=seen >= p.sensor_warm_up_cycles,
+            looked_long=seen >= p.giveup_looks,
             over_site=over and situation.sighting.ground_is_fresh,
             centred=error_m <= p.handover_error_m,
             at_safe_altitude=at_safe_altitude(pose, p, situation.above_lowest_m),
@@ -224,6 +229,15 @@ class Helm:
             self.state, self._since_ns = state, now_ns
             self._revision_at_state = situation.sighting.revision
             self._blockade.forget()
+
+    def _search_floor_m(self) -> float | None:
+        """Return the altitude to search from; None: from where the landing began."""
+        p, budget = self._p, self._budget
+        if self.state not in LOOKING or budget.outcome:
+            return None
+        if budget.searched_s < p.search_low_after_s:
+            return None
+        return p.search_floor * p.safe_altitude_m
 
     def _search_target(self, situation: Situation) -> tuple[float, float] | None:
         p, pose, best = self._p, situation.pose, situation.sighting.best

@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import hypot, inf
 
 from peace_ros.core.domain import Pose, Site
-from peace_ros.core.landing.decision import Focus, Verdict
+from peace_ros.core.landing.decision import Focus, RefusedPlace, Verdict
 from peace_ros.core.landing.memory import SiteMemory
 from peace_ros.core.landing.parameters import SAFETY_THRESHOLD_FLOOR, LandingParameters
+from peace_ros.core.landing.refusals import refused_places
 from peace_ros.core.landing.sites import Search, find_site, safe_ground
 from peace_ros.core.landing.situation import Sighting
 from peace_ros.core.landing.states import LOOKING, State
@@ -19,6 +21,10 @@ from peace_ros.core.mapping import MapLayers, SafetyMap
 _NS = 1e-9
 _RENEW_S = 0.5
 """Without a new heatmap the map is judged again after this time, because it ages."""
+_EXPLAIN_S = 1.0
+"""Refused places are looked for at most this often: they are for people."""
+_EXPLAIN_M = 60.0
+"""They are looked for up to this far to the north, south, east and west of the vehicle."""
 
 
 class Lookout:
@@ -49,6 +55,9 @@ class Lookout:
         self._focus: Focus | None = None
         self._judged = (-1, 0)
         self._ground_is_fresh = False
+        self.refused: tuple[RefusedPlace, ...] = ()
+        """The best places around the vehicle that are no sites, as of the last second."""
+        self._explained_ns: int | None = None
 
     def look(
         self,
@@ -135,13 +144,24 @@ class Lookout:
         layers = self._map.layers(now_ns, (focus.north_m, focus.east_m, reach_m))
         if state in LOOKING:
             self._choose_threshold(layers, age_limit_s, without_site_s)
-        self._verdict = self.anchored(self._find(layers, focus, pose, age_limit_s))
+        search = self._search(focus, pose, age_limit_s)
+        self._verdict = self.anchored(find_site(layers, search, self._p))
         if self._verdict.site is not None:
             self.memory.see(self._verdict.site)
         self._ground_is_fresh = self._fresh_below(now_ns, pose)
+        self._explain(now_ns, replace(search, incumbent=self._verdict.site))
 
-    def _find(self, layers: MapLayers, focus: Focus, pose: Pose, age_limit_s: float) -> Verdict:
-        search = Search(
+    def _explain(self, now_ns: int, search: Search) -> None:
+        """Renew the refused places, once per second."""
+        if self._explained_ns is not None and now_ns - self._explained_ns < _EXPLAIN_S / _NS:
+            return
+        self._explained_ns = now_ns
+        around = (search.pose.north_m, search.pose.east_m, _EXPLAIN_M)
+        layers = self._map.layers(now_ns, around)
+        self.refused = refused_places(layers, search, self._p, now_ns)
+
+    def _search(self, focus: Focus, pose: Pose, age_limit_s: float) -> Search:
+        return Search(
             pose=pose,
             focus=focus,
             threshold=self._threshold,
@@ -150,7 +170,6 @@ class Lookout:
             failed=self.memory.failed,
             incumbent=self._verdict.site or self._anchor,
         )
-        return find_site(layers, search, self._p)
 
     def _moved_focus(self, pose: Pose, state: State, *, is_new: bool) -> Focus:
         """Return the new circle of the search: it shrinks in steps and grows at once."""

@@ -10,6 +10,7 @@ from peace_ros.core.landing.decision import Decision
 _POSE = ('north_m', 'east_m', 'altitude_agl_m')
 _SITE = ('north_m', 'east_m', 'clearance_m', 'area_m2', 'confidence', 'age_s')
 _FOCUS = ('north_m', 'east_m', 'radius_m')
+_REFUSED = ('north_m', 'east_m', 'clearance_m', 'distance_m')
 
 
 def decision_pairs(decision: Decision, pose: Pose | None) -> dict[str, str]:
@@ -17,7 +18,8 @@ def decision_pairs(decision: Decision, pose: Pose | None) -> dict[str, str]:
 
     ``north_m``, ``east_m`` and ``altitude_agl_m`` are those of the pose, ``site_...`` and
     ``focus_...`` those of the decision, all in the local NED frame; ``heatmaps/...`` counts the
-    heatmaps by result; ``height/..._m`` are heights above ground by other sources.
+    heatmaps by result; ``height/..._m`` are heights above ground by other sources;
+    ``refused/1/...`` is the best of the places that are no sites.
     """
     numbers = {
         'effective_threshold': decision.effective_threshold,
@@ -27,10 +29,12 @@ def decision_pairs(decision: Decision, pose: Pose | None) -> dict[str, str]:
         'v_down_m_s': decision.setpoint.v_down_m_s,
         'time_in_state_s': decision.time_in_state_s,
     }
+    refused = [(f'refused/{n}/', each) for n, each in enumerate(decision.refused, start=1)]
     for prefix, thing, fields in (
         ('', pose, _POSE),
         ('site_', decision.site, _SITE),
         ('focus_', decision.focus, _FOCUS),
+        *((prefix, each, _REFUSED) for prefix, each in refused),
     ):
         if thing is not None:
             numbers.update({f'{prefix}{field}': getattr(thing, field) for field in fields})
@@ -44,6 +48,7 @@ def decision_pairs(decision: Decision, pose: Pose | None) -> dict[str, str]:
         'guard': '; '.join(decision.guard_notes),
         'failed_sites': str(decision.failed_sites),
         'attempts': str(decision.attempts),
+        **{f'{prefix}reason': each.reason for prefix, each in refused},
         **{key: f'{number:.3f}' for key, number in numbers.items()},
         **{f'heatmaps/{fate}': str(count) for fate, count in sorted(decision.counts.items())},
     }

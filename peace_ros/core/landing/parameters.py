@@ -182,6 +182,15 @@ class LandingParameters(ParameterSet):
     search_hold_s: float = parameter(
         6.0, 'SEARCHING hovers and looks this long before it moves.', low=0.0, high=300.0
     )
+    search_low_after_s: float = parameter(
+        60.0,
+        'After this time in search it goes on lower down, where more is seen of each place.',
+        low=0.0,
+        high=3600.0,
+    )
+    search_floor: float = parameter(
+        1.2, 'That search descends to this many safe altitudes.', low=1.0, high=24.0
+    )
     search_speed: float = parameter(
         4.0, 'Speed along the expanding square.', unit='m/s', low=0.2, high=15.0
     )
@@ -203,6 +212,13 @@ class LandingParameters(ParameterSet):
     # Times
     giveup_after_s: float = parameter(
         5.0, 'WAITING lasts this long before CLIMBING or RESTARTING.', low=0.5, high=60.0
+    )
+    giveup_looks: int = parameter(
+        10,
+        'WAITING also lasts this many heatmaps: at a low rate, ground that was closed by mistake '
+        'would not be seen safe again in time.',
+        low=1,
+        high=100,
     )
     search4new_place_s: float = parameter(
         60.0, 'RESTARTING looks this long for another site nearby.', low=1.0, high=600.0

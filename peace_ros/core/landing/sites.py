@@ -108,10 +108,7 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
     safe = safe_ground(layers, search.threshold, search.age_limit_s, p.min_looks)
     inside = layers.disc(search.focus.north_m, search.focus.east_m, search.focus.radius_m)
     if not safe[inside].any():
-        known = bool((layers.looks[inside] > 0).any())
-        return Verdict.no_zone(
-            'no ground in the focus is safe' if known else 'nothing is known yet'
-        )
+        return Verdict.no_zone(_nothing_safe(layers, search, inside, p))
     for each in search.failed:
         inside &= ~layers.disc(each.north_m, each.east_m, each.radius_m)
     ground = _JudgedGround(layers, safe, clearance(safe, layers.cell_m))
@@ -122,9 +119,8 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
             return Verdict.found(_site_at(ground, *kept))
         largest = float(ground.clearance_m[inside].max(initial=0.0))
         return Verdict.no_zone(
-            f'the widest safe ground has {largest:.1f} m of clearance and '
-            f'{search.required_clearance_m:.1f} m are needed'
-            + (', sites that failed left out' if search.failed else '')
+            f'the widest safe ground{" outside of failed sites" if search.failed else ""} is '
+            + too_narrow(largest, search.required_clearance_m)
         )
     preferred = wide & (ground.clearance_m >= p.preferred_clearance_m)
     candidates = preferred if preferred.any() else wide
@@ -138,6 +134,38 @@ def find_site(layers: MapLayers, search: Search, parameters: LandingParameters) 
     if kept is None or kept_cell is None or value[best] >= p.site_hysteresis * value[kept_cell]:
         kept = layers.centre_of(*best)
     return Verdict.found(_site_at(ground, *kept))
+
+
+def too_narrow(clearance_m: float, required_m: float) -> str:
+    """Return how much clearance is missing, rounded up to 0.1 m: what is refused misses some."""
+    missing_m = ceil(10.0 * (required_m - clearance_m) - 1e-6) / 10.0
+    return (
+        f'too narrow by {missing_m:.1f} m: {clearance_m:.1f} m of clearance, '
+        f'{required_m:.1f} m are needed from this altitude'
+    )
+
+
+def _nothing_safe(
+    layers: MapLayers, search: Search, inside: NDArray[np.bool_], parameters: LandingParameters
+) -> str:
+    """Return what the ground in the focus misses most: looks, a fresh look, or a higher score."""
+    looks, limit_s = parameters.min_looks, search.age_limit_s
+    most = int(layers.looks[inside].max(initial=0))
+    if most == 0:
+        return 'nothing is known yet'
+    if most < looks:
+        return f'the ground in the focus was seen in {most} frames at most, {looks} are needed'
+    age_s = float(layers.age_s[inside & (layers.looks >= looks)].min())
+    if age_s > limit_s:
+        return (
+            f'the ground in the focus was last seen {age_s:.0f} s ago, at most {limit_s:.0f} s '
+            'are allowed'
+        )
+    score = float(layers.score[inside].max())
+    return (
+        f'no ground in the focus is safe: the best score is {score:.2f}, '
+        f'{search.threshold:.2f} is needed around it'
+    )
 
 
 def _highest(value: NDArray[np.float32], candidates: NDArray[np.bool_]) -> tuple[int, int]:

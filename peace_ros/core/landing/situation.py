@@ -53,3 +53,5 @@ class Situation:
     """Altitude of the pose minus the lowest height that is believed; the floor counts from it."""
     search_target: tuple[float, float] | None = None
     """Where the search goes next (north, east); None while it stays and looks."""
+    search_floor_m: float | None = None
+    """Altitude that a search without success may descend to; None: it does not."""

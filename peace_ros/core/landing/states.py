@@ -72,6 +72,8 @@ class Events:
     """There is a SITE that can be reached from here."""
     warmed_up: bool = False
     """Enough heatmaps were seen since the state began."""
+    looked_long: bool = False
+    """So many that WAITING may give up."""
     over_site: bool = False
     """The vehicle and its radius lie within the clearance of the site, on ground just seen."""
     centred: bool = False
@@ -247,14 +249,14 @@ RULES: dict[State, tuple[Rule, ...]] = {
             'the site is safe again: moving over it',
         ),
         Rule(
-            'for {giveup_after_s} s, below the safe altitude',
-            lambda _s, e, t, p: t >= p.giveup_after_s and not e.at_safe_altitude,
+            'for {giveup_after_s} s and {giveup_looks} heatmaps, below the safe altitude',
+            lambda _s, e, t, p: t >= p.giveup_after_s and e.looked_long and not e.at_safe_altitude,
             State.CLIMBING,
             'the site was not found again: climbing to the safe altitude',
         ),
         Rule(
-            'for {giveup_after_s} s, at the safe altitude',
-            lambda _s, _e, t, p: t >= p.giveup_after_s,
+            'for {giveup_after_s} s and {giveup_looks} heatmaps, at the safe altitude',
+            lambda _s, e, t, p: t >= p.giveup_after_s and e.looked_long,
             State.RESTARTING,
             'the site was not found again: looking for another',
         ),

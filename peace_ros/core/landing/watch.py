@@ -130,6 +130,8 @@ class Budget:
         self._failed_because = ''
         self.without_site_s = 0.0
         """Time in search since a site was last known."""
+        self.searched_s = 0.0
+        """Time in search altogether."""
         self.search_m = 0.0
         """Distance flown in search."""
         self.attempts = 0
@@ -149,6 +151,8 @@ class Budget:
         self._last_ns = max(now_ns, self._last_ns)
         self._ever_site |= site_known
         self._measure_way(telemetry, looking=looking)
+        if looking:
+            self.searched_s += elapsed_s
         if site_known:
             self.without_site_s = 0.0
         elif looking:

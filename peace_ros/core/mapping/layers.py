@@ -29,6 +29,8 @@ class MapLayers:
     """North coordinate of the southern edge of row 0."""
     west_m: float
     """East coordinate of the western edge of column 0."""
+    unsafe_age_s: NDArray[np.float32]
+    """Seconds since the look that set the veto on a cell; infinite where no veto stands."""
 
     def centre_of(self, row: int, column: int) -> tuple[float, float]:
         """Return (north, east) metres of the middle of a cell."""

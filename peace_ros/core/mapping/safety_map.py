@@ -321,13 +321,14 @@ class SafetyMap:
         )
         known = looks > 0
         score = np.where(known, 1.0 / (1.0 + np.exp(-aged)), 0.0).astype(np.float32)
-        score[self._veto.closed(rows, columns, self._seconds(now_ns))] = 0.0
+        unsafe_age = self._veto.age_s(rows, columns, self._seconds(now_ns))
+        score[np.isfinite(unsafe_age)] = 0.0
         score[self._rough[rows, columns]] = 0.0
         age = self._seconds(now_ns) - self._seen_s[rows, columns]
         age = np.where(known, age, np.inf).astype(np.float32)
         south_m = grid.south_m + rows.start * grid.cell_m
         west_m = grid.west_m + columns.start * grid.cell_m
-        return MapLayers(score, age, looks.copy(), grid.cell_m, south_m, west_m)
+        return MapLayers(score, age, looks.copy(), grid.cell_m, south_m, west_m, unsafe_age)
 
     def _span(self, low_m: float, high_m: float) -> slice:
         cell = self.parameters.map_cell_m

@@ -77,23 +77,35 @@ class Veto:
         self._looks_due = np.zeros(shape, np.uint8)
         self._strikes = np.zeros(shape, np.uint8)
         self._until_s = np.full(shape, _NEVER_S, np.float32)
+        self._seen_s = np.full(shape, _NEVER_S, np.float32)
 
     def shift(self, d_row: int, d_column: int) -> None:
         """Follow the window of the map by whole cells."""
         self._looks_due = shifted(self._looks_due, d_row, d_column, 0)
         self._strikes = shifted(self._strikes, d_row, d_column, 0)
         self._until_s = shifted(self._until_s, d_row, d_column, float(_NEVER_S))
+        self._seen_s = shifted(self._seen_s, d_row, d_column, float(_NEVER_S))
 
     def widen(self, kernel: NDArray[np.uint8]) -> None:
         """Let closed cells close those around them."""
         self._looks_due = cast('NDArray[np.uint8]', cv2.dilate(self._looks_due, kernel))
         self._strikes = cast('NDArray[np.uint8]', cv2.dilate(self._strikes, kernel))
         self._until_s = cast('NDArray[np.float32]', cv2.dilate(self._until_s, kernel))
+        self._seen_s = cast('NDArray[np.float32]', cv2.dilate(self._seen_s, kernel))
 
     def closed(self, rows: slice, columns: slice, now_s: float) -> NDArray[np.bool_]:
         """Return which cells are closed at a time since the epoch of the map."""
         closed: NDArray[np.bool_] = self._looks_due[rows, columns] > 0
         return closed | (self._until_s[rows, columns] > now_s)
+
+    def age_s(self, rows: slice, columns: slice, now_s: float) -> NDArray[np.float32]:
+        """Return the seconds since the clearly unsafe look that closed each cell.
+
+        Infinite where no cell is closed.
+        """
+        age_s: NDArray[np.float32] = np.float32(now_s) - self._seen_s[rows, columns]
+        age_s[~self.closed(rows, columns, now_s)] = np.inf
+        return age_s
 
     def take(
         self,
@@ -115,6 +127,7 @@ class Veto:
         np.copyto(strikes, 0, where=(due == 0) & (until_s <= now_s))
         if not unsafe.any():
             return
+        np.copyto(self._seen_s[part], np.float32(now_s), where=unsafe)
         if self._is_whole_view(unsafe, was_safe):
             np.maximum(due, 1, out=due, where=unsafe)
             return

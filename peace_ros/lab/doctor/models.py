@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from peace_ros.core.domain import Frame, PeaceError
 from peace_ros.core.inference import Bundle
-from peace_ros.core.inference.providers import TENSORRT, engine_folder
+from peace_ros.core.inference.providers import CPU, TENSORRT, engine_folder
 from peace_ros.core.inference.session import providers_of_role
 from peace_ros.core.pipeline import Pipeline, create_generator, segmentation_of
 from peace_ros.core.presets import Preset
@@ -26,6 +26,8 @@ from peace_ros.lab.doctor.finding import Finding, Findings, fine, mend, not_chec
 FRAMES = 3
 SLOWEST_S = 1.0
 """The segmentation node warns from here on."""
+MOST_DIFFERENT = 0.1
+"""Of safety between two providers in 99 of 100 pixels; bf16 and fp16 may cost some of it."""
 
 
 class Models:
@@ -108,6 +110,45 @@ class Models:
             'camera, choose a faster provider, or end other processes'
         )
         yield mend(found, remedy, **figures)
+
+    def compare(self, width_px: int, height_px: int) -> Findings:
+        """Yield whether the providers give the heatmaps of ONNX Runtime's CPU provider.
+
+        An engine may read an operator in another way, and runs on without an error: see
+        docs/models.md. Takes a second load of the networks.
+
+        Args:
+            width_px: Of the camera's frames.
+            height_px: The same.
+        """
+        chosen = self._segmentation.providers
+        if self._pipeline is None or tuple(chosen) == (CPU,):
+            return
+        difference = 0.0
+        try:
+            common, own = segmentation_of(self._preset, providers=(CPU,))
+            usual = create_segmenter(common, own, log=self._notes)
+            [*self._notes.take()]
+            for frame in _frames(width_px, height_px):
+                look = self._pipeline.look(frame)
+                safety = usual.segment(frame, look.prompt).safety
+                apart = np.quantile(np.abs(safety - look.heatmap.safety), 0.99)
+                difference = max(difference, float(apart))
+        except PeaceError as error:
+            yield of_error(error)
+            return
+        found = (
+            f'{", ".join(chosen)}: safety differs from that of {CPU} by {difference:.3f} at most '
+            'in 99 % of the pixels'
+        )
+        if difference <= MOST_DIFFERENT:
+            yield fine(found, safety_difference=round(difference, 5))
+            return
+        remedy = (
+            f'at most {MOST_DIFFERENT:g} is good: the engine reads the network in another way; '
+            f'use {CPU}, or export the model again with a newer opset'
+        )
+        yield mend(found, remedy, safety_difference=round(difference, 5))
 
     def _whole(self, name: str) -> Findings:
         bundle = Bundle.load(name)

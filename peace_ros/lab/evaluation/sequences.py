@@ -29,7 +29,7 @@ from peace_ros.core.landing.heights import NO_OTHER_HEIGHT, HeightSight
 from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.parameters import CELL_SCORE_FLOOR, LandingParameters
 from peace_ros.core.landing.situation import Sighting
-from peace_ros.core.landing.states import STILL_STATES, TRANSITIONS, State
+from peace_ros.core.landing.states import LOOKING, STILL_STATES, TRANSITIONS, State
 from peace_ros.core.landing.watch import at_safe_altitude, valid_pose
 
 LENGTH = 12
@@ -236,7 +236,7 @@ class Trial:
         if doubtful and not self._engaged_now and not setpoint.is_zero:
             yield 'nothing moves while it is not certain that only we command'
         if setpoint.v_down_m_s > 0.0:
-            yield from self._broken_by_descent(moment, pose, seen)
+            yield from self._broken_by_descent(moment, pose, seen, state)
         lateral = hypot(v[0], v[1])
         if lateral > self._p.lateral_speed_limit + 1e-9 or not (
             -self._p.z_speed_climbing <= v[2] <= self._p.z_speed_landing
@@ -257,7 +257,7 @@ class Trial:
         yield from self._broken_by_fence(pose, setpoint.v_north_m_s)
 
     def _broken_by_descent(
-        self, moment: SequenceStep, pose: Pose | None, seen: Sighting
+        self, moment: SequenceStep, pose: Pose | None, seen: Sighting, state: State
     ) -> Iterator[str]:
         p, site = self._p, seen.verdict.site
         above_m = moment.heights.above_lowest_m
@@ -267,6 +267,10 @@ class Trial:
             yield 'never down while heights disagree'
         if not moment.map_age_s <= p.descent_heatmap_age_limit_s:
             yield 'never down without a fresh map'
+        if pose is not None and state in LOOKING:
+            if not pose.altitude_agl_m - above_m > p.search_floor * p.safe_altitude_m:
+                yield 'a search never goes down to the safe altitude'
+            return
         if not moment.ground_age_s <= p.descent_heatmap_age_limit_s:
             yield 'never down without a fresh look at the ground below'
         if not moment.ground_score >= CELL_SCORE_FLOOR or not moment.ground_is_fresh:

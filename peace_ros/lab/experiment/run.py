@@ -12,6 +12,8 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from itertools import groupby
 
+import cv2
+
 from peace_ros.core.domain import ConfigurationError, PeaceError
 from peace_ros.lab.experiment.fly import fly_run
 from peace_ros.lab.experiment.settings import ExperimentSettings, FlightKey
@@ -104,7 +106,13 @@ def _fly_all(
 def _executor(workers: int, scheduler: str) -> Iterator[Executor]:
     if not scheduler:
         # A fresh interpreter: threads of the networks do not survive a fork.
-        pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context('spawn'))
+        # OpenCV's own threads would only take cores from the other workers.
+        pool = ProcessPoolExecutor(
+            workers,
+            mp_context=multiprocessing.get_context('spawn'),
+            initializer=cv2.setNumThreads,
+            initargs=(1,),
+        )
         try:
             yield pool
         except KeyboardInterrupt:

@@ -4,22 +4,86 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
+from peace_ros.lab.replay import run
+from peace_ros.lab.replay.regression import GoldenOptions, Regression, replay_regression
 from peace_ros.lab.replay.report import ReplayReport
-from peace_ros.lab.replay.run import ReplayOptions, replay
+from peace_ros.lab.replay.trace import described
 
 
-def replay_in_terminal(options: ReplayOptions, console: Console) -> ReplayReport:
+def replay_in_terminal(options: run.ReplayOptions, console: Console) -> ReplayReport:
     """Replay with a progress bar and print the summary.
 
     Raises:
         PeaceError: as :func:`peace_ros.lab.replay.replay` does.
     """
+    with _shown(console) as show:
+        report, folder = run.replay(options, show)
+    console.print(_table(report, folder))
+    return report
+
+
+def compare_in_terminal(
+    options: run.ReplayOptions, golden: GoldenOptions, console: Console
+) -> bool:
+    """Replay, compare with the golden file or make it, and print both; return whether it passed.
+
+    Raises:
+        PeaceError: as :func:`peace_ros.lab.replay.regression.replay_regression` does.
+    """
+    with _shown(console) as show:
+        result = replay_regression(options, golden, show)
+    console.print(_table(result.report, result.folder))
+    if result.golden is None:
+        console.print(
+            f'{golden.file} was made: {len(result.found.masks)} frames, states '
+            f'{", ".join(result.found.distinct_states)}. Look at the results before you keep it.',
+            highlight=False,
+        )
+        return True
+    console.print(_checks(result))
+    told = described(result.golden.made_with)
+    console.print(f'golden: {told}', f'now: {described(result.found.made_with)}', sep='\n')
+    if result.first_ns is not None:
+        console.print(
+            f'first difference at {result.first_ns * 1e-9:.1f} s: '
+            f'{result.folder / "difference.png"}',
+            highlight=False,
+        )
+    return result.passed
+
+
+def compare_presets_in_terminal(
+    options: run.ReplayOptions, presets: tuple[str, str], console: Console
+) -> None:
+    """Replay with two presets, and print both and where their page is.
+
+    Raises:
+        PeaceError: as :func:`peace_ros.lab.replay.side_by_side.replay_side_by_side` does.
+    """
+    # Here, because the page needs an extra that other replays do without.
+    from peace_ros.lab.replay.side_by_side import figures, replay_side_by_side  # noqa: PLC0415
+
+    with _shown(console) as show:
+        sides, page = replay_side_by_side(options, presets, show)
+    table = Table('', *(each.name for each in sides))
+    for heading, cells in figures(sides):
+        table.add_row(heading, *cells)
+    console.print(table)
+    console.print(f'page: {page}', highlight=False)
+
+
+@contextmanager
+def _shown(console: Console) -> Iterator[run.Progress]:
+    """Show a progress bar; yield what it is told with."""
     columns = (
         TextColumn('{task.description}'),
         BarColumn(),
@@ -32,9 +96,15 @@ def replay_in_terminal(options: ReplayOptions, console: Console) -> ReplayReport
         def show(done: int, total: int, state: str) -> None:
             bar.update(task, completed=done, total=max(done, total), description=state or 'frames')
 
-        report, folder = replay(options, show)
-    console.print(_table(report, folder))
-    return report
+        yield show
+
+
+def _checks(result: Regression) -> Table:
+    table = Table('check', '', 'found', 'tolerance')
+    for each in result.checks:
+        verdict = Text('same', 'green') if each.passed else Text('OTHER', 'bold red')
+        table.add_row(each.name, verdict, each.found, each.tolerance)
+    return table
 
 
 def _table(report: ReplayReport, folder: Path) -> Table:

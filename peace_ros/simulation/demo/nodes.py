@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The command lines of the five nodes."""
+"""The command lines of the six nodes."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ MODULES = {
     'prompt_generator': 'peace_ros.nodes.prompt_generator',
     'segmentation': 'peace_ros.nodes.segmentation',
     'landing': 'peace_ros.nodes.landing',
+    'recorder': 'peace_ros.recorder.recorder',
     'satellite_view': 'peace_ros.simulation.nodes.satellite_view',
     'autopilot_sim': 'peace_ros.simulation.nodes.autopilot_sim',
 }
@@ -36,6 +37,8 @@ class Wiring:
     lens: Distortion | None
     """None: without distortion."""
     preset: Path
+    recordings: Path
+    """Folder of the flight recorder."""
     speed: float
     mavlink: str
     """URL for the landing node."""
@@ -71,6 +74,7 @@ def node_arguments(wiring: Wiring) -> Arguments:
     arguments['segmentation'] = ros_arguments(clock, wiring.preset)
     # What took the frames comes with them; only the mount is not in camera_info.
     mount = {name: value for name, value in camera.items() if name.startswith('mount_')}
+    arguments['recorder'] = ros_arguments({**clock, 'recordings': str(wiring.recordings)})
     arguments['landing'] = ros_arguments(
         {**clock, **mount, 'mavlink': wiring.mavlink}, wiring.preset
     )

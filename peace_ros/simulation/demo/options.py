@@ -97,6 +97,9 @@ class DemoOptions:
         float, Option('--timeout', metavar='S', help='Seconds that the landing may take.')
     ] = DEFAULT_TIMEOUT_S
     """Wall clock, from the engagement."""
+    watch: Annotated[
+        bool, Option('--watch', help='Show the flight on a live page (peace watch) too.')
+    ] = False
 
     def __post_init__(self) -> None:
         self._check_world()

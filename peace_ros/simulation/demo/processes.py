@@ -31,6 +31,7 @@ class _Running:
     name: str
     process: subprocess.Popen[bytes]
     log: Path
+    may_end: bool
 
 
 @final
@@ -56,8 +57,12 @@ class ProcessGroup:
         """Name -> process id of what was started."""
         return {each.name: each.process.pid for each in self._running}
 
-    def start(self, name: str, module: str, arguments: Sequence[str] = ()) -> None:
+    def start(
+        self, name: str, module: str, arguments: Sequence[str] = (), *, may_end: bool = False
+    ) -> None:
         """Run ``python -m module arguments``; its output goes to ``<log_dir>/<name>.log``.
+
+        With ``may_end`` the others go on without it.
 
         Raises:
             ProcessError: the log or the process cannot be created.
@@ -86,7 +91,7 @@ class ProcessGroup:
             )
         except OSError as error:
             raise ProcessError(f'{name} cannot be started ({error}): see {log}') from error
-        self._running.append(_Running(name, process, log))
+        self._running.append(_Running(name, process, log, may_end))
 
     def check(self) -> None:
         """Do nothing while all processes live.
@@ -96,7 +101,7 @@ class ProcessGroup:
         """
         for each in self._running:
             status = each.process.poll()
-            if status is not None:
+            if status is not None and not each.may_end:
                 raise ProcessError(
                     f'{each.name} ended by itself with status {status}; the end of {each.log}:\n'
                     + log_tail(each.log)

@@ -40,6 +40,8 @@ class Snapshot:
     prompt: str = ''
     site: str = ''
     rates: str = ''
+    link: str = ''
+    """What the autopilot says of itself, and how old that is."""
 
     def words(self) -> str:
         """Return the prompt as a person would read it."""
@@ -114,6 +116,7 @@ class Progress:
         table.add_row('prompt', Text(snapshot.words() or '-'))
         table.add_row('site', Text(snapshot.site or '-'))
         table.add_row('rates', Text(snapshot.rates or '-'))
+        table.add_row('link', Text(snapshot.link or '-'))
         return Panel(table, title=self._title, title_align='left', border_style='blue')
 
 

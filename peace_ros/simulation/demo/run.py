@@ -7,6 +7,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,10 +18,12 @@ from peace_ros.core.landing import LandingParameters
 from peace_ros.core.presets import Preset, load_preset
 from peace_ros.recording import BagWriter
 from peace_ros.simulation.camera import NadirCamera
+from peace_ros.simulation.demo.history import Status
 from peace_ros.simulation.demo.isolation import free_udp_port, isolate
 from peace_ros.simulation.demo.monitor import HEATMAP, IMAGE, STATUS, Monitor
 from peace_ros.simulation.demo.nodes import MODULES, Wiring, node_arguments
 from peace_ros.simulation.demo.options import DemoOptions
+from peace_ros.simulation.demo.page import live_page
 from peace_ros.simulation.demo.piloting import VehicleLine
 from peace_ros.simulation.demo.processes import ProcessGroup
 from peace_ros.simulation.demo.progress import Progress, Snapshot
@@ -76,6 +79,7 @@ class _Run:
             camera=self.options.camera_options,
             lens=self.options.lens,
             preset=self.preset.path,
+            recordings=self.run_dir / 'recordings',
             speed=self.speed,
             mavlink=self.options.mavlink or f'udpout:127.0.0.1:{port}',
             pose_mavlink=self.options.pose_mavlink,
@@ -110,7 +114,8 @@ def run_demo(options: DemoOptions, console: Console) -> int:
             f'ROS domain {domain}',
             highlight=False,
         )
-        run, monitor = _attempts(options, run_dir, preset, world, console)
+        with live_page(run_dir, console) if options.watch else nullcontext():
+            run, monitor = _attempts(options, run_dir, preset, world, console)
         ending = run.ending or Ending('error', 'nothing happened', None)
         setting = Setting(
             seed=options.seed,
@@ -171,7 +176,7 @@ def _fly(run: _Run, monitor: Monitor, group: ProcessGroup) -> Ending:
     arguments = node_arguments(run.wiring)
     landing = arguments.pop('landing')
     for name, given in arguments.items():
-        group.start(name, MODULES[name], given)
+        group.start(name, MODULES[name], given, may_end=name == 'recorder')
     if run.options.own_autopilot:
         # Our own autopilot talks to any number of peers; a given one may know only one URL,
         # which the pilot must have left before the landing node can use it.
@@ -316,8 +321,19 @@ def _snapshot(run: _Run, monitor: Monitor) -> Snapshot:
         altitude_agl_m=altitude_m,
         prompt=prompt,
         site=site,
+        link='' if status is None else _link(status),
         rates=f'{count} heatmaps, {heatmap_hz:.1f}/s, speed {run.speed:g}' if count else '',
     )
+
+
+def _link(status: Status) -> str:
+    """Return what is known of the autopilot: mode, who is in control, and the age of its data."""
+    obeys = {'true': 'follows us', 'false': 'does not follow us'}.get(
+        status.values.get('in_control', ''), 'control not known'
+    )
+    age_s = status.number('telemetry_age_s')
+    age = 'nothing heard yet' if age_s is None else f'{age_s:.1f} s old'
+    return ', '.join(filter(None, (status.values.get('mode', ''), obeys, age)))
 
 
 def _finish(

@@ -18,12 +18,16 @@ from peace_ros.simulation.drawing.window import DrawnWindow
 
 _FINER = 2
 
+Region = tuple[slice, slice]
+"""Rows and columns of a canvas."""
+
 
 class Canvas:
     """Colour in full sun, label and height of each pixel of a window."""
 
     def __init__(self, window: DrawnWindow, seed: int) -> None:
         self.window = window
+        self.seed = seed
         self.noise = Noise(window, seed)
         self.rgb: FloatImage = np.zeros((*window.shape, 3), np.float32)
         """Height x width x 3, 0 to 255."""
@@ -33,9 +37,7 @@ class Canvas:
         self.veil_m: FloatImage = np.zeros(window.shape, np.float32)
         """Height of bare branches, which let most of the light through."""
 
-    def region(
-        self, low_m: NDArray[np.float64], high_m: NDArray[np.float64]
-    ) -> tuple[slice, slice] | None:
+    def region(self, low_m: NDArray[np.float64], high_m: NDArray[np.float64]) -> Region | None:
         """Return rows and columns of the pixels in a box with a pixel of margin, if any."""
         w = self.window
         c0, r0 = (int(v) for v in np.floor(w.pixels(low_m)) - 1)
@@ -44,6 +46,11 @@ class Canvas:
         if c0 >= c1 or r0 >= r1:
             return None
         return slice(r0, r1), slice(c0, c1)
+
+    @property
+    def whole(self) -> Region:
+        """The region of all pixels."""
+        return slice(0, self.window.height_px), slice(0, self.window.width_px)
 
     def sub_window(self, rows: slice, columns: slice) -> DrawnWindow:
         """Return the window of a region."""
@@ -56,9 +63,7 @@ class Canvas:
             w.gsd_m,
         )
 
-    def coverage(
-        self, polygons_m: Sequence[NDArray[np.float64]], region: tuple[slice, slice]
-    ) -> FloatImage:
+    def coverage(self, polygons_m: Sequence[NDArray[np.float64]], region: Region) -> FloatImage:
         """Return which part of each pixel of a region polygons cover, 0 to 1."""
         sub = self.sub_window(*region)
         factor = 4 if sub.width_px * sub.height_px < 200_000 else 2
@@ -70,15 +75,16 @@ class Canvas:
         small = cv2.resize(mask, (sub.width_px, sub.height_px), interpolation=cv2.INTER_AREA)
         return np.asarray(small.astype(np.float32) * np.float32(1.0 / 255.0))
 
-    def blend(self, region: tuple[slice, slice], alpha: FloatImage, rgb: Rgb) -> None:
+    def blend(self, region: Region, alpha: FloatImage, rgb: Rgb) -> None:
         """Lay a colour over a region with an opacity per pixel."""
         part = self.rgb[region]
         part += (np.asarray(rgb, np.float32) - part) * alpha[..., None]
 
 
-def paint_ground(canvas: Canvas, plan: Plan) -> None:
-    """Fill the colour and the labels of the whole window with the ground of a plan."""
-    window = canvas.window
+def paint_ground(canvas: Canvas, plan: Plan, region: Region) -> None:
+    """Fill the colour and the labels of a region with the ground of a plan."""
+    window = canvas.sub_window(*region)
+    noise = Noise(window, canvas.seed)
     seen = [g for g in plan.grounds if window.sees(g.low_m, g.high_m)]
     materials, index = _indexed(plan.background, seen)
     fine = window.finer(_FINER)
@@ -96,14 +102,13 @@ def paint_ground(canvas: Canvas, plan: Plan) -> None:
     for channel in range(3):
         large = colours[:, channel].take(fine_ids)
         base[..., channel] = cv2.resize(large, size, interpolation=cv2.INTER_AREA)
-    canvas.labels[:] = np.array([m.label for m in materials], np.uint8)[ids]
+    canvas.labels[region] = np.array([m.label for m in materials], np.uint8)[ids]
     shift = np.array([np.subtract(m.other_rgb, m.rgb) for m in materials], np.float32)
-    noise = canvas.noise
     mix = np.clip(0.42 + 0.42 * noise.band(1.0, 32.0, 0.6, 1), 0.0, 1.0)
     base += shift[ids] * mix[..., None]
-    base *= _texture(canvas, materials, ids)[..., None]
-    canvas.rgb[:] = base
-    _paint_markings(canvas, plan.markings())
+    base *= _texture(window, noise, materials, ids)[..., None]
+    canvas.rgb[region] = base
+    _paint_markings(canvas, region, plan.markings(), noise)
 
 
 def _indexed(
@@ -115,8 +120,9 @@ def _indexed(
     return list(index), index
 
 
-def _texture(canvas: Canvas, materials: Sequence[Material], ids: NDArray[np.int16]) -> FloatImage:
-    noise, window = canvas.noise, canvas.window
+def _texture(
+    window: DrawnWindow, noise: Noise, materials: Sequence[Material], ids: NDArray[np.int16]
+) -> FloatImage:
     contrast = np.array([m.contrast for m in materials], np.float32)
     gain = contrast[:, 0][ids] * noise.band(4.0, 32.0, 0.5)
     gain += contrast[:, 1][ids] * noise.band(0.5, 2.0, 0.4)
@@ -136,14 +142,15 @@ def _texture(canvas: Canvas, materials: Sequence[Material], ids: NDArray[np.int1
     return np.asarray(np.clip(1.0 + gain, 0.25, 1.9), np.float32)
 
 
-def _paint_markings(canvas: Canvas, quads_m: NDArray[np.float64]) -> None:
-    window = canvas.window
+def _paint_markings(
+    canvas: Canvas, region: Region, quads_m: NDArray[np.float64], noise: Noise
+) -> None:
+    window = canvas.sub_window(*region)
     low, high = quads_m.min(axis=1, initial=1e9), quads_m.max(axis=1, initial=-1e9)
     seen = (low < (window.right_m, window.bottom_m)).all(1)
     seen &= (high > (window.left_m, window.top_m)).all(1)
     if not seen.any():
         return
-    region = (slice(0, window.height_px), slice(0, window.width_px))
     alpha = canvas.coverage(list(quads_m[seen]), region)
-    worn = np.clip(0.68 + 0.2 * canvas.noise.band(0.25, 4.0, 0.3), 0.1, 0.95)
+    worn = np.clip(0.68 + 0.2 * noise.band(0.25, 4.0, 0.3), 0.1, 0.95)
     canvas.blend(region, np.asarray(alpha * worn, np.float32), (214.0, 214.0, 208.0))

@@ -142,7 +142,8 @@ class Plan:
     warp: Warp
     background: Material
     grounds: list[Ground] = field(default_factory=list)
-    _painted: list[tuple[float, float, float, float]] = field(default_factory=list)
+    painted: list[tuple[float, float, float, float]] = field(default_factory=list)
+    """Markings before the warp: left, upper, right, lower edge."""
     buildings: list[Building] = field(default_factory=list)
     trees: list[Tree] = field(default_factory=list)
     things: list[Thing] = field(default_factory=list)
@@ -170,19 +171,21 @@ class Plan:
         for k in range(count):
             a, b = k / count, (k + 1) / count
             right, lower = x0 + dx * b if dx else x1, y0 + dy * b if dy else y1
-            self._painted.append((x0 + dx * a, y0 + dy * a, right, lower))
+            self.painted.append((x0 + dx * a, y0 + dy * a, right, lower))
 
     def markings(self) -> Points:
         """Return all painted quadrilaterals, (N, 4, 2): no label of their own."""
-        if not self._painted:
-            return np.zeros((0, 4, 2))
-        boxes = np.array(self._painted)
-        corners = boxes[:, [0, 1, 2, 1, 2, 3, 0, 3]].reshape(-1, 2)
-        quads = self.warp.points(corners).reshape(-1, 4, 2)
+        quads = self.quads()
         for line_m, reach_m in self.wet:
             away = quads.mean(axis=1)[:, None, :] - line_m[None, :, :]
             quads = quads[np.hypot(away[..., 0], away[..., 1]).min(axis=1) > reach_m]
         return quads
+
+    def quads(self) -> Points:
+        """Return the quadrilaterals of `painted` after the warp, (N, 4, 2)."""
+        boxes = np.array(self.painted, float).reshape(-1, 4)
+        corners = boxes[:, [0, 1, 2, 1, 2, 3, 0, 3]].reshape(-1, 2)
+        return self.warp.points(corners).reshape(-1, 4, 2)
 
     def put(self, item: Building | Thing) -> None:
         """Set up a building, vehicle, person or obstacle that is given in plan coordinates."""

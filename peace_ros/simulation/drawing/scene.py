@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import WorldError
-from peace_ros.simulation.drawing.canvas import Canvas, paint_ground
+from peace_ros.simulation.drawing.canvas import Canvas, Region, paint_ground
 from peace_ros.simulation.drawing.crowns import draw_trees
 from peace_ros.simulation.drawing.layouts import LAYOUTS, plan_layout
 from peace_ros.simulation.drawing.light import Sun
@@ -69,10 +69,28 @@ class Look:
         )
 
 
-def render(plan: Plan, window: DrawnWindow, seed: int, sun: Sun, look: Look) -> Canvas:
-    """Draw a plan in a window; the canvas then holds the final colours, labels and heights."""
+def render(
+    plan: Plan,
+    window: DrawnWindow,
+    seed: int,
+    sun: Sun,
+    look: Look,
+    shown: Region | None = None,
+) -> Canvas:
+    """Draw a plan in a window; the canvas then holds the final colours, labels and heights.
+
+    Args:
+        plan: of the place.
+        window: where heights count.
+        seed: of the noise.
+        sun: of the place.
+        look: of the camera.
+        shown: pixels of the window that will be looked at; the rest only casts shadows and has
+            neither ground nor light. None: all.
+    """
     canvas = Canvas(window, seed)
-    paint_ground(canvas, plan)
+    shown = canvas.whole if shown is None else shown
+    paint_ground(canvas, plan, shown)
     for barrier in plan.barriers:
         stamp_barrier(canvas, barrier)
     for thing in plan.things:
@@ -85,28 +103,34 @@ def render(plan: Plan, window: DrawnWindow, seed: int, sun: Sun, look: Look) -> 
         np.maximum(shadow, 0.4 * sun.shadow(canvas.veil_m, window.gsd_m), out=shadow)
     sky = np.array([0.90, 0.97, 1.12], np.float32) * look.ambient
     depth = sun.clearness * (1.0 - sky)
-    canvas.rgb *= 1.0 - shadow[..., None] * depth
+    canvas.rgb[shown] *= 1.0 - shadow[shown][..., None] * depth
     return canvas
 
 
-def develop(canvas: Canvas, look: Look, seed: int) -> NDArray[np.uint8]:
-    """Turn the colours of a canvas into the 8-bit image that a camera would give."""
-    image = canvas.rgb
-    gsd = canvas.window.gsd_m
+def develop(rgb: FloatImage, look: Look, grain: FloatImage) -> NDArray[np.uint8]:
+    """Turn colours into the 8-bit image that a camera would give.
+
+    Args:
+        rgb: height x width x 3, 0 to 255.
+        look: of the camera.
+        grain: see :func:`sensor_noise`.
+    """
+    image = rgb
     if look.blur_px > 0.3:
         image = np.asarray(cv2.GaussianBlur(image, (0, 0), look.blur_px), np.float32)
     grey = image @ np.array([0.3, 0.59, 0.11], np.float32)
     image = grey[..., None] + (image - grey[..., None]) * np.float32(look.saturation)
     image = image * np.asarray(look.gain, np.float32)
     image = (image - 112.0) * np.float32(look.contrast) + np.float32(112.0 + look.haze)
-    grain = _grain(canvas, seed, gsd) * np.float32(look.grain)
-    return np.asarray(np.clip(image + grain, 0.0, 255.0), np.uint8)
+    return np.asarray(np.clip(image + grain * np.float32(look.grain), 0.0, 255.0), np.uint8)
 
 
-def _grain(canvas: Canvas, seed: int, gsd: float) -> FloatImage:
-    # Sensor noise belongs to pixels, not to the ground: it is drawn from the place of the window.
-    w = canvas.window
-    key = [seed, 9, abs(round(w.left_m / gsd)), abs(round(w.top_m / gsd))]
+def sensor_noise(w: DrawnWindow, seed: int) -> FloatImage:
+    """Return the noise of the pixels of a window, height x width x 1, unit variance.
+
+    It belongs to pixels and not to the ground: it is drawn from the place of the window.
+    """
+    key = [seed, 9, abs(round(w.left_m / w.gsd_m)), abs(round(w.top_m / w.gsd_m))]
     rng = np.random.Generator(np.random.PCG64(key))
     return rng.standard_normal((*w.shape, 1), dtype=np.float32)
 
@@ -143,7 +167,8 @@ def draw_scene(
     plan = plan_layout(rng, layout, season, extent)
     window = DrawnWindow(-0.5 * extent, -0.5 * extent, size_px, size_px, gsd_m)
     canvas = render(plan, window, seed, sun, look)
-    return Scene(develop(canvas, look, seed), canvas.labels, gsd_m, season, layout)
+    image = develop(canvas.rgb, look, sensor_noise(window, seed))
+    return Scene(image, canvas.labels, gsd_m, season, layout)
 
 
 def _check(seed: int, size_px: int, gsd_m: float, season: str | None, layout: str | None) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from math import pi
+from math import ceil, cos, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,16 @@ from peace_ros.simulation.drawing.layouts import fill_district, run_avenue
 from peace_ros.simulation.drawing.light import Sun
 from peace_ros.simulation.drawing.palette import SEASONS, Palette
 from peace_ros.simulation.drawing.plan import Plan, Warp
+from peace_ros.simulation.drawing.plan_index import PlanIndex
 from peace_ros.simulation.drawing.river import add_river
-from peace_ros.simulation.drawing.scene import Look, develop, render
+from peace_ros.simulation.drawing.scene import Look, develop, render, sensor_noise
 from peace_ros.simulation.drawing.window import DrawnWindow
 
 _TILE_PX = 1000
 _MARGIN_M = 24.0
 """Longest shadow that reaches into a tile from outside."""
+_RIM_M, _RIM_PX = 0.8, 8
+"""How far around a tile the light on crowns and the blur of the camera reach."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,8 @@ class Town:
         self._seed, self._half_m = seed, 0.5 * extent_m
         self._sun = Sun(float(rng.uniform(0.0, 2.0 * pi)), float(rng.uniform(0.75, 1.0)), 0.9)
         self._look = Look.draw(rng)
-        self._plan = plan_town(rng, season or drawn_season, extent_m, DISTRICTS[district])
+        plan = plan_town(rng, season or drawn_season, extent_m, DISTRICTS[district])
+        self._index = PlanIndex(plan)
 
     def draw(
         self, rows: slice, columns: slice, gsd_m: float
@@ -89,17 +93,34 @@ class Town:
             columns: pixels, counted from the west edge.
             gsd_m: metres per pixel.
         """
-        margin = round(_MARGIN_M / gsd_m)
-        window = DrawnWindow(
-            (columns.start - margin) * gsd_m - self._half_m,
-            (rows.start - margin) * gsd_m - self._half_m,
-            columns.stop - columns.start + 2 * margin,
-            rows.stop - rows.start + 2 * margin,
+        part = DrawnWindow(
+            columns.start * gsd_m - self._half_m,
+            rows.start * gsd_m - self._half_m,
+            columns.stop - columns.start,
+            rows.stop - rows.start,
             gsd_m,
         )
-        canvas = render(self._plan, window, self._seed, self._sun, self._look)
-        inner = (slice(margin, window.height_px - margin), slice(margin, window.width_px - margin))
-        return develop(canvas, self._look, self._seed)[inner], canvas.labels[inner]
+        rim, margin = _aligned(_RIM_M / gsd_m + _RIM_PX), round(_MARGIN_M / gsd_m)
+        # Only what stands towards the sun casts a shadow into the part.
+        east, south = cos(self._sun.azimuth_rad), sin(self._sun.azimuth_rad)
+        up, down = (_aligned(rim + margin * max(0.0, each)) for each in (-south, south))
+        left, right = (_aligned(rim + margin * max(0.0, each)) for each in (-east, east))
+        window = part.grown(left, up, right, down)
+        shown = (
+            slice(up - rim, up + part.height_px + rim),
+            slice(left - rim, left + part.width_px + rim),
+        )
+        plan = self._index.within(window)
+        canvas = render(plan, window, self._seed, self._sun, self._look, shown)
+        noise = sensor_noise(part.grown(margin, margin, margin, margin), self._seed)
+        crop = slice(margin - rim, rim - margin)
+        image = develop(canvas.rgb[shown], self._look, noise[crop, crop])
+        return image[rim:-rim, rim:-rim], canvas.labels[shown][rim:-rim, rim:-rim]
+
+
+def _aligned(px: float) -> int:
+    """Return at least this many pixels: smooth noise is drawn in blocks of four."""
+    return 4 * ceil(px / 4.0)
 
 
 def check_town(district: str, season: str) -> None:

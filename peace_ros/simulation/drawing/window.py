@@ -47,6 +47,16 @@ class DrawnWindow:
             self.gsd_m / factor,
         )
 
+    def grown(self, left_px: int, top_px: int, right_px: int, bottom_px: int) -> DrawnWindow:
+        """Return a larger window with the same pixels."""
+        return DrawnWindow(
+            self.left_m - left_px * self.gsd_m,
+            self.top_m - top_px * self.gsd_m,
+            self.width_px + left_px + right_px,
+            self.height_px + top_px + bottom_px,
+            self.gsd_m,
+        )
+
     def pixels(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (N, 2) columns and rows of points in metres; pixel centres are whole numbers."""
         return (points_m - (self.left_m, self.top_m)) / self.gsd_m - 0.5

@@ -304,3 +304,28 @@ def test_the_floor_counts_from_the_lowest_height():
     low = replace(seen(26.0), above_lowest_m=4.0)
     assert limited(down, low)[0].v_down_m_s == pytest.approx(2.0)
     assert limited(down, replace(low, above_lowest_m=6.0))[0].is_zero
+
+
+DOWN = Setpoint(0, v_down_m_s=1.0)
+
+
+@pytest.mark.parametrize(
+    ('altitude_m', 'above_lowest_m', 'down_m_s'),
+    [(70.0, 0.0, 1.0), (60.1, 0.0, 1.0), (60.0, 0.0, 0.0), (70.0, 10.0, 0.0), (55.0, 0.0, 0.0)],
+)
+def test_a_search_goes_down_without_a_site_only_above_its_floor(
+    altitude_m, above_lowest_m, down_m_s
+):
+    searching = replace(
+        seen(altitude_m, verdict=NO_SITE), search_floor_m=60.0, above_lowest_m=above_lowest_m
+    )
+    assert limited(DOWN, searching)[0].v_down_m_s == down_m_s
+
+
+def test_a_search_goes_down_only_by_fresh_heatmaps_and_never_below_the_safe_altitude():
+    searching = replace(seen(70.0, verdict=NO_SITE), search_floor_m=60.0)
+    old = replace(searching, sighting=replace(searching.sighting, map_age_s=1.6))
+    assert limited(DOWN, old)[0].v_down_m_s == 0.0
+    assert limited(DOWN, replace(searching, search_floor_m=None))[0].v_down_m_s == 0.0
+    low = replace(seen(49.0, verdict=NO_SITE), search_floor_m=20.0)
+    assert limited(DOWN, low)[0].v_down_m_s == 0.0

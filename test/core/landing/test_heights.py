@@ -148,3 +148,56 @@ def test_a_hand_over_waits_until_every_source_was_heard(watched: Watched) -> Non
     assert not watched.see(20.2, pictures(24.0)).may_hand_over, 'at once, before it is a doubt'
     assert not watched.see(20.2, pictures(20.4), for_s=1.0).may_hand_over
     assert watched.see(22.0, pictures(20.2), for_s=2.0).may_hand_over, 'the lowest counts'
+
+
+def test_at_a_limit_heights_agree(watched: Watched) -> None:
+    assert not watched.see(40.0, pictures(44.0), for_s=9.0).problem, '4 m apart, 4 m allowed'
+    assert watched.see(20.0, pictures(22.0), for_s=9.0).may_hand_over, '2 m apart, 2 m allowed'
+    assert watched.see(100.0, pictures(150.0), for_s=2.0).problem
+    assert not watched.see(100.0, pictures(107.0), for_s=4.0).problem, '7 of 10 m end a doubt'
+
+
+def at(watch: HeightWatch, at_s: float, altitude_m: float, *reports: HeightReport) -> HeightSight:
+    return watch.see(round(at_s * S), pose_of(altitude_m), reports, over_site=True)
+
+
+def test_a_doubt_needs_a_second_counted_from_the_first_difference() -> None:
+    watch = HeightWatch(P)
+    assert not at(watch, 100.0, 40.0, pictures(40.0)).problem
+    assert not at(watch, 100.5, 40.0, pictures(30.0)).problem
+    assert not at(watch, 101.25, 40.0, pictures(30.0)).problem
+    assert at(watch, 101.5, 40.0, pictures(30.0)).problem
+    # The very next report may agree.
+    assert at(watch, 102.0, 40.0, pictures(40.0)).problem
+    assert at(watch, 104.75, 40.0, pictures(40.0)).problem
+    assert not at(watch, 105.0, 40.0, pictures(40.0)).problem
+
+
+def test_at_the_hand_over_altitude_a_second_and_a_half_are_enough() -> None:
+    limit_m = P.handover_altitude_m + P.handover_tolerance_m
+    watch = HeightWatch(P)
+    assert not at(watch, 100.0, limit_m, pictures(limit_m)).may_hand_over
+    assert not at(watch, 101.25, limit_m, pictures(limit_m)).may_hand_over
+    assert at(watch, 101.5, limit_m, pictures(limit_m)).may_hand_over
+
+
+def test_one_source_that_differs_is_enough_against_a_hand_over(watched: Watched) -> None:
+    seen = watched.see(20.0, pictures(30.0), laser(20.0), for_s=2.0)
+    assert not seen.may_hand_over
+
+
+def test_each_doubt_is_said(watched: Watched) -> None:
+    problem = watched.see(40.0, pictures(30.0), laser(31.0), for_s=2.0).problem
+    first, second = problem.split('; ')
+    assert 'by pictures' in first
+    assert second.startswith('the altitude above ground is 40.0 m')
+    assert 'by rangefinder' in second
+
+
+def test_a_rangefinder_that_does_not_count_hides_no_other_source(watched: Watched) -> None:
+    seen = watched.see(40.0, laser(20.0), pictures(41.0), site=False)
+    assert seen.heights_m == {'pictures': 41.0}
+
+
+def test_without_a_position_nothing_is_compared(watched: Watched) -> None:
+    assert watched.see(None, pictures(0.5)).heights_m == {}

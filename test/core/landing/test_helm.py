@@ -507,3 +507,25 @@ def test_a_mode_that_is_not_known_holds():
     decision = trip.step(mode_known=False)
     assert decision.state is State.HOLD
     assert 'until the autopilot reports its mode' in decision.reason
+
+
+def test_a_search_without_success_goes_on_lower_down_but_above_the_safe_altitude():
+    trip = Trip(LandingParameters(search_low_after_s=20.0, max_search_s=120.0), altitude_m=100.0)
+    trip.run(19.0)
+    assert trip.lowest_m >= 100.0
+    assert trip.run(90.0).state is State.SEARCHING
+    assert 60.0 < trip.lowest_m < 62.0
+    assert trip.home_m > 20.0, 'it goes on along the square'
+
+
+def test_a_search_stays_up_where_it_is_told_to():
+    trip = Trip(LandingParameters(search_low_after_s=3600.0), altitude_m=100.0)
+    assert trip.run(400.0).outcome == 'no_zone'
+    assert trip.lowest_m >= 100.0
+
+
+def test_a_search_that_begins_below_its_floor_does_not_go_down():
+    trip = Trip(LandingParameters(search_low_after_s=0.0), altitude_m=56.0)
+    trip.run(60.0)
+    assert trip.lowest_m >= 56.0
+    assert trip.altitude_m < 58.0

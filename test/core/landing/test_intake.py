@@ -10,9 +10,9 @@ import pytest
 
 from peace_ros.core.domain import NADIR, Camera, DepthImage, Frame, Heatmap, Mount, Pose
 from peace_ros.core.domain.geometry import mount_from_degrees, quaternion_from_euler
-from peace_ros.core.landing import LandingParameters
+from peace_ros.core.landing import LandingParameters, odometry, picture_height
 from peace_ros.core.landing.intake import HeatmapIntake
-from peace_ros.core.mapping import MapParameters, SafetyMap
+from peace_ros.core.mapping import MapParameters, Mismatch, SafetyMap
 
 S = 1_000_000_000
 CAMERA = Camera.from_degrees(352, 352, 73.0)
@@ -253,6 +253,33 @@ def test_another_calibration_drops_the_map_that_was_seen_with_the_first(intake, 
     assert safety_map.layers(round(2.2 * S)).looks.max() == 2
 
 
+def test_a_map_that_another_calibration_dropped_is_missed_for_that_reason(intake):
+    intake.add_pose(pose_of(2.1, quaternion=quaternion_from_euler(radians(45), 0.0, 0.0)))
+    intake.add_heatmap(seen_by(heatmap_of(2.1), (640, 360), WIDE))
+    assert intake.drops == 1
+    assert intake.last_rejection == 'the camera has another calibration, so the map was dropped'
+
+
+def test_pictures_are_compared_with_the_camera_of_the_newest_calibration(intake, monkeypatch):
+    used = []
+
+    def compare(before, after, camera, *_):
+        used.append(camera)
+        return Mismatch.DIFFERENT
+
+    monkeypatch.setattr(picture_height, 'height_change', compare)
+    monkeypatch.setattr(odometry, 'register', compare)
+    intake.add_pose(pose_of(2.1))
+    intake.add_heatmap(seen_by(heatmap_of(2.1), (640, 360), WIDE))
+    for tick in range(22, 40):
+        known = pose_of(0.1 * tick)
+        intake.add_pose(known if tick < 30 else replace(known, north_m=nan, east_m=nan))
+        intake.add_view(Frame(np.full((360, 640, 3), tick, np.uint8), round(0.1 * tick * S)))
+        intake.tick(round(0.1 * tick * S))
+    assert len(used) > 10
+    assert {id(each) for each in used} == {id(WIDE)}
+
+
 def test_after_calibrated_frames_one_without_calibration_is_not_used(intake, safety_map):
     intake.add_pose(pose_of(2.1))
     intake.add_heatmap(seen_by(heatmap_of(2.1), (352, 352), CAMERA))
@@ -291,20 +318,22 @@ def test_another_mount_drops_the_map(intake, safety_map):
     assert safety_map.stamp_ns is not None
     intake.place_camera(Mount(offset_frd_m=(0.5, 0.0, 0.0)))
     assert safety_map.stamp_ns is None
-    assert 'mounted otherwise' in intake.last_rejection
+    assert intake.last_rejection == 'the camera is mounted otherwise, so the map was dropped'
 
 
 def test_pictures_and_depth_of_another_shape_are_counted_and_not_used(intake):
-    intake.add_view(Frame(np.full((36, 64, 3), 9, np.uint8), round(2.0 * S)))
+    for _ in range(2):
+        intake.add_view(Frame(np.full((36, 64, 3), 9, np.uint8), round(2.0 * S)))
     intake.add_depth(DepthImage(np.full((36, 64), 9.0, np.float32), round(2.0 * S)))
-    assert intake.counts['picture of another shape than the frames'] == 1
+    assert intake.counts['picture of another shape than the frames'] == 2
     assert intake.counts['depth of another shape than the frames'] == 1
 
 
 def test_reasons_without_end_do_not_fill_the_memory(intake):
     for number in range(1000):
         intake.reject(f'the frames have {number} px')
-    assert len(intake.counts) < 100
+    assert len(intake.counts) == 65
+    assert intake.counts['other reasons'] == 1000 - 63
     assert intake.counts['the frames have 0 px'] == 1
     assert sum(intake.counts.values()) == 20 + 1000
     assert intake.last_rejection == 'the frames have 999 px'

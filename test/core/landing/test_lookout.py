@@ -41,6 +41,7 @@ class PaintedMap:
             0.5,
             -50.0,
             -50.0,
+            np.full(shape, np.inf, np.float32),
         )
         for north_m, east_m, radius_m, score in self.discs:
             layers.score[layers.disc(north_m, east_m, radius_m)] = score
@@ -82,6 +83,27 @@ def test_a_sighting_tells_what_the_map_says(painted):
     assert seen.reachable == seen.verdict.site == seen.best
     early = lookout.look(painted.stamp_ns - S, pose, State.SEARCHING, 0.0)
     assert early.map_age_s == 0.0
+
+
+def test_refused_places_are_found_once_per_second_and_forgotten_with_the_choice(painted):
+    lookout = Lookout(P, painted)
+    painted.score = 0.05
+    painted.discs = [(20.0, 0.0, 3.0, 0.95)]
+    lookout.look(painted.stamp_ns, HIGH, State.SEARCHING, 0.0)
+    (place,) = lookout.refused
+    assert (place.north_m, place.east_m) == pytest.approx((20.0, 0.0), abs=1.0)
+    assert 'too narrow by' in place.reason
+    painted.discs = []
+    painted.revision += 1
+    lookout.look(painted.stamp_ns + S // 2, HIGH, State.SEARCHING, 0.0)
+    assert lookout.refused == (place,)
+    painted.revision += 1
+    lookout.look(painted.stamp_ns + S, HIGH, State.SEARCHING, 0.0)
+    assert lookout.refused == ()
+    painted.discs = [(20.0, 0.0, 3.0, 0.95)]
+    look(lookout, painted, State.SEARCHING)
+    lookout.forget_choice()
+    assert lookout.refused == ()
 
 
 def test_without_a_pose_nothing_is_judged_and_without_a_heatmap_the_map_has_no_age():
@@ -311,7 +333,7 @@ def test_the_first_heatmap_is_judged_at_once_and_after_each_change_of_state(pain
 
 def test_the_ground_below_is_asked_for_around_the_vehicle(painted):
     look(Lookout(P, painted), painted, State.LANDING, replace(HIGH, north_m=3.0, east_m=-4.0))
-    assert painted.asked[-1] == (3.0, -4.0, P.safety_radius_m + 2.0)
+    assert (3.0, -4.0, P.safety_radius_m + 2.0) in painted.asked
 
 
 @pytest.mark.parametrize('state', [State.SEARCHING, State.RESTARTING, State.RETURNING])

@@ -7,6 +7,7 @@ from math import inf
 
 from peace_ros.core.domain import Pose, Setpoint, Site
 from peace_ros.core.landing import Decision, Focus, State, Verdict
+from peace_ros.core.landing.decision import RefusedPlace
 from peace_ros.core.landing.pairs import decision_pairs
 
 SITE = Site(5.0, -3.0, clearance_m=6.25, area_m2=200.0, confidence=0.9, age_s=0.4)
@@ -70,6 +71,7 @@ def test_every_pair_of_a_decision_has_its_key():
         failed_sites=2,
         attempts=1,
         counts={'used': 4},
+        refused=(RefusedPlace(1.0, -2.0, 2.5, 30.0, 'too narrow'),),
     )
     assert decision_pairs(decision, Pose(7, 10.0, 20.0, -42.0, (1.0, 0.0, 0.0, 0.0), 42.0)) == {
         'state': 'AIMING',
@@ -99,4 +101,9 @@ def test_every_pair_of_a_decision_has_its_key():
         'focus_east_m': '2.000',
         'focus_radius_m': '30.000',
         'heatmaps/used': '4',
+        'refused/1/north_m': '1.000',
+        'refused/1/east_m': '-2.000',
+        'refused/1/clearance_m': '2.500',
+        'refused/1/distance_m': '30.000',
+        'refused/1/reason': 'too narrow',
     }

@@ -131,3 +131,60 @@ def test_an_altitude_below_the_ground_is_skipped(pictures: Pictures) -> None:
     assert pictures.take(60.0, -1.0) is None
     assert pictures.take(59.0, 59.0) is None
     assert pictures.take(58.0, 58.0) == pytest.approx(58.0)
+
+
+def test_half_a_metre_above_the_ground_is_measured(pictures: Pictures) -> None:
+    pictures.take(0.6, 0.6)
+    assert pictures.take(0.5, 0.5) == pytest.approx(0.5)
+
+
+def test_pictures_are_measured_from_the_first_moment_of_a_clock(pictures: Pictures) -> None:
+    pictures._at_s = 0.0
+    pictures.take(60.0, 60.0, later_s=0.1)
+    assert pictures.take(58.0, 58.0, later_s=0.3) == pytest.approx(58.0), 'the period is 0.3 s'
+
+
+def test_one_picture_that_shows_nothing_makes_no_new_key(pictures: Pictures) -> None:
+    pictures.take(60.0, 60.0)
+    pictures.take(59.0, 59.0)
+    pictures.blind = {58.0}
+    pictures.take(58.0, 58.0)
+    pictures.take(57.0, 57.0)
+    assert pictures.compared[-1] == (60.0, 57.0)
+
+
+def test_a_second_without_a_measurement_is_no_gap_yet(pictures: Pictures) -> None:
+    pictures.take(60.0, 60.0)
+    pictures.take(59.0, 59.0)
+    pictures.blind = {58.0}
+    pictures.take(58.0, 58.0, later_s=1.0)
+    pictures.take(57.0, 57.0)
+    assert pictures.compared[-1] == (60.0, 57.0)
+
+
+@pytest.mark.parametrize(('true_m', 'moved', 'key_m'), [(69.0, 0.0, 60.0), (60.0, 0.25, 60.0)])
+def test_at_its_limits_a_key_stays(
+    pictures: Pictures, true_m: float, moved: float, key_m: float
+) -> None:
+    pictures.take(60.0, 60.0)
+    pictures.moved = moved
+    pictures.take(true_m, true_m)
+    pictures.take(61.0, 61.0)
+    assert pictures.compared[-1] == (key_m, 61.0)
+
+
+def test_another_camera_is_used_from_the_next_picture_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    used = []
+
+    def change(before: View, after: View, camera: Camera) -> Mismatch:
+        used.append(camera)
+        return Mismatch.DIFFERENT
+
+    monkeypatch.setattr(picture_height, 'height_change', change)
+    height = PictureHeight(CAMERA)
+    other = Camera.from_degrees(640, 480, 60.0)
+    height.change_camera(other)
+    for at_s in (1, 2):
+        pose = Pose(at_s * S, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 30.0)
+        height.take(View(np.zeros((8, 8), np.uint8), pose))
+    assert {id(each) for each in used} == {id(other)}

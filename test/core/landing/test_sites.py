@@ -42,6 +42,7 @@ def layers_with(*discs: tuple[float, float, float], score: float = 0.95) -> MapL
         0.5,
         -50.0,
         -50.0,
+        np.full((CELLS, CELLS), np.inf, np.float32),
     )
     for disc in discs:
         layers.score[layers.disc(*disc)] = score
@@ -101,6 +102,7 @@ def test_a_single_unsafe_cell_is_an_obstacle_but_a_doubtful_one_is_not():
 def test_says_how_much_clearance_is_missing():
     verdict = find_site(layers_with((0.0, 0.0, 2.5)), SEARCH, P)
     assert verdict.kind is VerdictKind.NO_ZONE
+    assert 'too narrow by ' in verdict.reason
     assert '3.0 m are needed' in verdict.reason
 
 
@@ -300,19 +302,25 @@ def test_a_site_tells_of_its_ground_what_the_map_shows():
     assert site.age_s == 1.5
 
 
-@pytest.mark.parametrize(('north_m', 'word'), [(0.0, 'no ground in the focus is safe'), (40.0, '')])
-def test_says_whether_ground_is_unsafe_or_not_known(north_m, word):
-    layers = layers_with()
-    layers.looks[:100] = 1
-    layers.looks[100:] = 0
-    focus = Focus(-40.0 + north_m * 2.0, 0.0, 8.0)
-    reason = find_site(layers, replace(SEARCH, focus=focus), P).reason
-    assert reason == (word or 'nothing is known yet')
+@pytest.mark.parametrize(
+    ('score', 'looks', 'age_s', 'missing'),
+    [
+        (0.9, 0, np.inf, 'nothing is known yet'),
+        (0.9, 2, 0.0, 'seen in 2 frames at most, 3 are needed'),
+        (0.9, 9, 14.0, 'last seen 14 s ago, at most 10 s are allowed'),
+        (0.7, 9, 0.0, 'the best score is 0.70, 0.80 is needed'),
+    ],
+)
+def test_says_what_all_ground_in_the_focus_is_missing(score, looks, age_s, missing):
+    layers = layers_with((0.0, 0.0, 20.0), score=score)
+    layers.looks[:] = looks
+    layers.age_s[:] = age_s
+    assert missing in find_site(layers, SEARCH, P).reason
 
 
 def test_says_that_the_focus_lies_outside_of_the_map():
     empty = np.zeros((0, 0), np.float32)
-    layers = MapLayers(empty, empty, empty.astype(np.uint16), 0.5, 0.0, 0.0)
+    layers = MapLayers(empty, empty, empty.astype(np.uint16), 0.5, 0.0, 0.0, empty)
     assert find_site(layers, SEARCH, P).reason == 'the focus lies outside of the map'
     safe = safe_ground(layers, 0.8, 10.0, 3)
     assert (safe.shape, safe.dtype) == ((0, 0), bool)
@@ -359,8 +367,8 @@ def test_says_when_only_places_that_failed_are_left():
     failed = (FailedPlace(0.0, 0.0, 20.0, 0),)
     verdict = find_site(layers_with((0.0, 0.0, 8.0)), replace(SEARCH, failed=failed), P)
     assert verdict.reason == (
-        'the widest safe ground has 0.0 m of clearance and 3.0 m are needed, '
-        'sites that failed left out'
+        'the widest safe ground outside of failed sites is too narrow by 3.0 m: 0.0 m of '
+        'clearance, 3.0 m are needed from this altitude'
     )
     whole_focus = replace(SEARCH, focus=Focus(0.0, 0.0, 9.0), failed=failed)
     assert find_site(layers_with((0.0, 0.0, 8.0)), whole_focus, P).reason == verdict.reason

@@ -17,6 +17,7 @@ PLANS = (
     'new_engagement',
     'site_known',
     'warmed_up',
+    'looked_long',
     'over_site',
     'centred',
     'at_safe_altitude',
@@ -183,10 +184,17 @@ def test_an_aborted_landing_goes_on_saying_why():
 
 
 def test_waiting_ends_upwards_below_the_safe_altitude_and_elsewhere_above_it():
-    assert next_state(State.WAITING, FLYING, P.giveup_after_s, P)[0] is State.CLIMBING
-    high = replace(FLYING, at_safe_altitude=True)
+    looked = replace(FLYING, looked_long=True)
+    assert next_state(State.WAITING, looked, P.giveup_after_s, P)[0] is State.CLIMBING
+    high = replace(looked, at_safe_altitude=True)
     assert next_state(State.WAITING, high, P.giveup_after_s, P)[0] is State.RESTARTING
     assert next_state(State.WAITING, high, P.giveup_after_s - 0.1, P)[0] is State.WAITING
+
+
+@pytest.mark.parametrize('high', [False, True])
+def test_waiting_goes_on_until_enough_heatmaps_have_shown_the_site(high):
+    seldom = replace(FLYING, at_safe_altitude=high)
+    assert next_state(State.WAITING, seldom, 60.0, P)[0] is State.WAITING
 
 
 @pytest.mark.parametrize('state', [State.SEARCHING, State.CLIMBING, State.RESTARTING])

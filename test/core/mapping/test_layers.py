@@ -17,6 +17,7 @@ LAYERS = MapLayers(
     cell_m=0.5,
     south_m=10.0,
     west_m=-4.0,
+    unsafe_age_s=np.full((ROWS, COLUMNS), np.inf, np.float32),
 )
 
 

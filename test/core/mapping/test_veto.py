@@ -40,6 +40,15 @@ def test_one_look_at_a_person_closes_ground_that_was_safe_for_long(
     assert score_at(lawn, 5.0, 5.0) > 0.9, 'only where the person is'
 
 
+def test_closed_ground_tells_the_age_of_the_look_that_closed_it(lawn, camera, look, pose_at):
+    lawn.add(look(4.2, 0.95, spot=0.05, spot_px=PERSON_PX), camera, pose_at())
+    layers = lawn.layers(round(6.7 * S))
+    ages_s = layers.unsafe_age_s
+    assert ages_s[layers.cell_at(0.0, 0.0)] == pytest.approx(2.5, abs=0.01)
+    assert ages_s[layers.cell_at(5.0, 0.0)] == float('inf')
+    assert (layers.score[ages_s < float('inf')] == 0.0).all()
+
+
 def test_it_takes_both_time_and_clear_looks_to_open_again(lawn, camera, look, pose_at):
     lawn.add(look(4.2, 0.95, spot=0.05, spot_px=PERSON_PX), camera, pose_at())
     for number in range(8):  # looks enough, but within a second

@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import json
 import shutil
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -110,3 +112,58 @@ def test_a_slow_frame_is_to_be_mended(monkeypatch, to_mend) -> None:
 def test_other_providers_replace_those_of_the_preset(to_mend) -> None:
     models = Models(load_preset('dd_cs'), ['NoSuchProvider'])
     assert 'NoSuchProvider' in to_mend(models.load())[0][0]
+
+
+@pytest.fixture
+def bundle_of_two_readings(tmp_path) -> Path:
+    """A bundle whose scores are halved, but not by an engine that ignores a reduction's axes."""
+    onnx = pytest.importorskip('onnx')
+    folder = Path(shutil.copytree(models_dir() / 'clipseg-small', tmp_path / 'two_readings'))
+    manifest = json.loads((folder / 'manifest.json').read_text())
+    name = manifest['roles']['decoder']
+    model = onnx.load(folder / name)
+    for each in model.graph.node:
+        each.output[:] = ['whole' if out == 'positive' else out for out in each.output]
+        each.input[:] = ['whole' if given == 'positive' else given for given in each.input]
+    ones = onnx.numpy_helper.from_array(np.ones((2, 2), np.float32), 'ones')
+    quarter = onnx.numpy_helper.from_array(np.float32(0.25), 'quarter')
+    model.graph.initializer.extend([ones, quarter])
+    make = onnx.helper.make_node
+    model.graph.node.extend(
+        [
+            make('ReduceL1', ['ones'], ['sums'], axes=[1]),  # 2 and 2; all of it would be 4
+            make('ReduceMax', ['sums'], ['largest'], keepdims=0),
+            make('Mul', ['largest', 'quarter'], ['share']),
+            make('Mul', ['whole', 'share'], ['positive']),
+        ]
+    )
+    onnx.save(model, folder / name)
+    data = (folder / name).read_bytes()
+    manifest['files'][name] = {'sha256': hashlib.sha256(data).hexdigest(), 'bytes': len(data)}
+    (folder / 'manifest.json').write_text(json.dumps(manifest))
+    return folder
+
+
+def test_an_engine_that_reads_a_network_in_another_way_is_to_be_mended(
+    own_preset, bundle_of_two_readings, to_mend
+) -> None:
+    pytest.importorskip('openvino')
+    models = Models(own_preset({'bundle': str(bundle_of_two_readings)}), [providers.OPENVINO])
+    assert not to_mend(models.load())
+    ((what, remedy),) = to_mend(models.compare(352, 352))
+    assert 'safety differs from that of CPUExecutionProvider' in what
+    assert 'newer opset' in remedy
+
+
+def test_an_engine_that_agrees_is_fine(to_mend) -> None:
+    pytest.importorskip('openvino')
+    models = Models(load_preset('dd_cs'), [providers.OPENVINO])
+    (found,) = [[*models.load()], *models.compare(64, 48)][1:]
+    assert not to_mend([found])
+    assert found.figures['safety_difference'] < 0.001
+
+
+def test_the_usual_provider_is_not_compared_with_itself() -> None:
+    models = Models(load_preset('dd_cs'))
+    assert [*models.load()]
+    assert not [*models.compare(64, 48)]

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+pytest.importorskip('pyarrow')
+
 from peace_ros.cli.main import app
 from peace_ros.lab.experiment.fly import fly_run
 from peace_ros.lab.experiment.places import Place

@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytest.importorskip('pyarrow')
+
 from peace_ros.core.domain import ConfigurationError, RecordingError
 from peace_ros.lab.experiment import run as running
 from peace_ros.lab.experiment.figures import figures
@@ -80,6 +82,19 @@ def test_the_same_seed_flies_the_same_flight(town):
     first, second = (fly(settings_for(town, error_rate=0.01, limit_s=12.0))[0] for _ in range(2))
     assert first['track_east_m'] == second['track_east_m']
     assert first['miou'] == second['miou'] < 0.995
+
+
+def test_a_flight_over_a_drawn_town_stays_as_it_was():
+    """Whoever makes a run faster must not change what it does."""
+    settings = ExperimentSettings(runs=6, eyes='truth', limit_s=40.0)
+    (row,) = fly(settings, run=5)
+    track = list(
+        zip(*(row[f'track_{axis}_m'] for axis in ('north', 'east', 'altitude')), strict=True)
+    )
+    assert row['heatmaps'] == 33
+    assert row['track_state'][::10] == ['SEARCHING', *['AIMING'] * 4]
+    expected = [(0, 0, 100.4), (8.2, -6.7, 100.4), (14.7, -11.7, 87.3), (14.7, -11.7, 72.7)]
+    assert track[:40:10] == [pytest.approx(each, abs=0.5) for each in expected]
 
 
 def test_finished_runs_are_kept_and_not_flown_again(town, tmp_path, monkeypatch):

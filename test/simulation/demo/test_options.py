@@ -157,6 +157,7 @@ def wiring(tmp_path, photo, **changes) -> Wiring:
         'camera': DemoOptions(camera_size='704x396', mount_pitch_deg=15.0).camera_options,
         'lens': None,
         'preset': tmp_path / 'preset.yaml',
+        'recordings': tmp_path / 'recordings',
         'speed': 2.0,
         'mavlink': 'udpout:127.0.0.1:5',
         'pose_mavlink': None,
@@ -165,9 +166,10 @@ def wiring(tmp_path, photo, **changes) -> Wiring:
     return Wiring(**{**plain, **changes})
 
 
-def test_with_our_own_autopilot_five_nodes_share_its_clock(tmp_path, photo) -> None:
+def test_with_our_own_autopilot_six_nodes_share_its_clock(tmp_path, photo) -> None:
     arguments = node_arguments(wiring(tmp_path, photo))
-    assert len(arguments) == 5
+    assert len(arguments) == 6
+    assert f"recordings:='{tmp_path / 'recordings'}'" in arguments['recorder']
     for name, given in arguments.items():
         clock = 'publish_clock:=true' if name == 'autopilot_sim' else 'use_sim_time:=true'
         assert clock in given

@@ -19,6 +19,7 @@ SHOWN = Snapshot(
     prompt='A rendered image of {term} in fog.',
     site='+10 m north',
     rates='12 heatmaps',
+    link='GUIDED, follows us, 0.1 s old',
 )
 
 
@@ -50,7 +51,15 @@ def test_a_tty_gets_one_panel_with_everything(monkeypatch) -> None:
     with Progress(Console(file=out, force_terminal=True, width=100), lambda: SHOWN, 'peace demo'):
         time.sleep(0.3)
     told = out.getvalue()
-    for part in ('peace demo', 'AIMING', 'a site is known', '57.2 m', 'in fog', '+10 m north'):
+    for part in (
+        'peace demo',
+        'AIMING',
+        'a site is known',
+        '57.2 m',
+        'in fog',
+        '+10 m north',
+        'GUIDED, follows us',
+    ):
         assert part in told
 
 

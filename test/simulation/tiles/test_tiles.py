@@ -17,6 +17,8 @@ import pytest
 import rasterio
 from typer.testing import CliRunner
 
+pytest.importorskip('requests')
+
 from peace_ros.cli.main import app
 from peace_ros.core.domain import ConfigurationError, WorldError
 from peace_ros.simulation.tiles.cache import TileCache
