@@ -103,11 +103,13 @@ class TwistLink:
         self._publish(Twist())
         return RequestResult(Answer.ACCEPTED)
 
-    def request_land(self) -> RequestResult:
+    def request_land(self, _wanted: Callable[[], bool] = lambda: True) -> RequestResult:
         """Refuse: such a vehicle has no modes."""
         return _NO_MODES
 
-    request_level_hold = request_land
+    def request_level_hold(self) -> RequestResult:
+        """Refuse: such a vehicle has no modes."""
+        return _NO_MODES
 
     def stop_at_once(self) -> bool:
         """Stop the vehicle."""

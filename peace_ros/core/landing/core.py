@@ -25,7 +25,7 @@ from peace_ros.core.domain import (
 from peace_ros.core.landing.decision import Decision
 from peace_ros.core.landing.engagement import engagement_problem
 from peace_ros.core.landing.guidance import over_site
-from peace_ros.core.landing.heights import HeightWatch
+from peace_ros.core.landing.heights import NO_OTHER_HEIGHT, HeightWatch
 from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.intake import HeatmapIntake
 from peace_ros.core.landing.lookout import Lookout
@@ -74,6 +74,7 @@ class LandingCore:
         )
         self._lookout = Lookout(parameters, self.safety_map)
         self._heights = HeightWatch(parameters)
+        self._height_sight = NO_OTHER_HEIGHT
         self._helm = Helm(parameters)
         self._last_ns: int | None = None
         self._drops = 0
@@ -176,8 +177,11 @@ class LandingCore:
             self._drops = self._intake.drops
             self._lookout.forget_choice()
         pose, before = valid_pose(telemetry, self.parameters), self._helm.state
-        sighting = self._lookout.look(now_ns, pose, before, self._helm.without_site_s)
-        heights = self._heights.see(
+        # The heights need to know whether a site is below: those of the step before are used.
+        sighting = self._lookout.look(
+            now_ns, pose, before, self._helm.without_site_s, self._height_sight.above_lowest_m
+        )
+        self._height_sight = heights = self._heights.see(
             now_ns,
             pose,
             self._height_reports(now_ns, telemetry, pose),

@@ -98,12 +98,12 @@ def _down(
 
 
 def _lateral_to_site(
-    pose: Pose, site: Site | None, parameters: LandingParameters, gain: float
+    pose: Pose, situation: Situation, parameters: LandingParameters, gain: float
 ) -> tuple[float, float]:
-    limit_m_s = parameters.lateral_speed_limit
+    limit_m_s, site = parameters.lateral_speed_limit, situation.site
     if site is None:
         return 0.0, 0.0
-    if not at_safe_altitude(pose, parameters):
+    if not at_safe_altitude(pose, parameters, situation.above_lowest_m):
         if site.distance_m(pose) > site.clearance_m:
             return 0.0, 0.0
         limit_m_s = min(limit_m_s, parameters.landing_lateral_speed_limit)
@@ -112,7 +112,7 @@ def _lateral_to_site(
 
 def _aim(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wish:
     p, site = parameters, situation.site
-    north, east = _lateral_to_site(pose, site, p, p.gain * p.aiming_gain_mult)
+    north, east = _lateral_to_site(pose, situation, p, p.gain * p.aiming_gain_mult)
     tolerance_m = 0.0 if site is None else site.clearance_m - p.safety_radius_m
     floor_m = p.aiming_floor * p.safe_altitude_m
     down, note = _down(pose, situation, p, floor_m=floor_m, tolerance_m=tolerance_m, share=0.5)
@@ -121,7 +121,7 @@ def _aim(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wi
 
 def _land(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wish:
     p, site = parameters, situation.site
-    north, east = _lateral_to_site(pose, site, p, p.gain)
+    north, east = _lateral_to_site(pose, situation, p, p.gain)
     room_m = 0.0 if site is None else site.clearance_m - p.safety_radius_m
     tolerance_m = min(max(0.5, 0.5 * room_m), room_m)
     floor_m = p.handover_altitude_m
@@ -139,7 +139,8 @@ def _search(pose: Pose, situation: Situation, parameters: LandingParameters) -> 
     All of it where lateral motion meets no obstacle.
     """
     p = parameters
-    if not at_safe_altitude(pose, p) or situation.site is not None:
+    safe = at_safe_altitude(pose, p, situation.above_lowest_m)
+    if not safe or situation.site is not None:
         return _STAND, 'looking'
     begun_m = (situation.home or pose).altitude_agl_m
     down = _to_altitude(pose, situation, min(begun_m, _HIGHEST_SEARCH_M), p)
@@ -172,7 +173,7 @@ def _return(pose: Pose, situation: Situation, parameters: LandingParameters) -> 
     p, home = parameters, situation.home
     if home is None:
         return _STAND, 'where the landing began is not known'
-    if not at_safe_altitude(pose, p):
+    if not at_safe_altitude(pose, p, situation.above_lowest_m):
         return _climb(pose, situation, p)
     north, east = _towards(pose, home.north_m, home.east_m, p.gain, p.search_speed)
     return (north, east, 0.0), ''

@@ -148,7 +148,7 @@ class Helm:
         # What a fence takes from the speed is no drift.
         fenced = telemetry is not None and telemetry.fence != ''
         self._drift.see(None if fenced else pose, self._told)
-        wish = self._drift.made_up(wish, self._lateral_limit_m_s(pose))
+        wish = self._drift.made_up(wish, self._lateral_limit_m_s(situation))
         setpoint, guard_notes = self._guard.limit(wish, situation)
         self._told = setpoint
         relaxed = sighting.threshold < p.safety_threshold
@@ -168,8 +168,8 @@ class Helm:
             heights_m=heights.heights_m,
         )
 
-    def _lateral_limit_m_s(self, pose: Pose | None) -> float:
-        high = at_safe_altitude(pose, self._p)
+    def _lateral_limit_m_s(self, situation: Situation) -> float:
+        high = at_safe_altitude(situation.pose, self._p, situation.above_lowest_m)
         return self._p.lateral_speed_limit if high else self._p.landing_lateral_speed_limit
 
     def _time_in_state_s(self, now_ns: int) -> float:
@@ -215,7 +215,7 @@ class Helm:
             looked_long=seen >= p.giveup_looks,
             over_site=over and situation.sighting.ground_is_fresh,
             centred=error_m <= p.handover_error_m,
-            at_safe_altitude=at_safe_altitude(pose, p),
+            at_safe_altitude=at_safe_altitude(pose, p, situation.above_lowest_m),
             low_enough_to_land=lowest_m <= p.aiming_floor * p.safe_altitude_m + _AIMED_M,
             at_handover_altitude=lowest_m <= p.handover_altitude_m + p.handover_tolerance_m
             and may_hand_over,

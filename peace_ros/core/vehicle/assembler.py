@@ -114,7 +114,7 @@ class Assembler:
         self._height: Height | None = None
         self._heights = Pairwise(self._parameters.jump_limit_m)
         self._range: tuple[int, float] | None = None
-        self._ranges = Pairwise(self._parameters.jump_limit_m)
+        self._ranges = Pairwise(self._parameters.jump_limit_m, first=False)
         self._others = OtherHeights(self._parameters.jump_limit_m)
         self._newest_boot_ms: dict[str, int] = {}
         self._estimator: tuple[int, int, int] | None = None

@@ -243,7 +243,8 @@ class Trial:
             -self._p.z_speed_climbing <= v[2] <= self._p.z_speed_landing
         ):
             yield 'speed is limited'
-        if lateral > 0.0 and pose is not None and not at_safe_altitude(pose, self._p):
+        above_m = moment.heights.above_lowest_m
+        if lateral > 0.0 and pose is not None and not at_safe_altitude(pose, self._p, above_m):
             site = seen.reachable
             if site is None or site.distance_m(pose) > site.clearance_m:
                 yield 'no lateral motion below the safe altitude but within the clearance'

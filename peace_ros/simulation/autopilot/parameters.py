@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from peace_ros.core.domain.parameters import ParameterSet, parameter
+from peace_ros.simulation.autopilot.datum import Datum
 
 
 @dataclass(frozen=True)
@@ -121,3 +122,13 @@ class AutopilotParameters(ParameterSet):
     rangefinder_max_m: float = parameter(
         0.0, 'Range of the downward rangefinder; 0: there is none.', unit='m', low=0.0, high=500.0
     )
+
+    @property
+    def datum(self) -> Datum:
+        """Where home lies on the globe."""
+        return Datum(
+            self.home_latitude_deg,
+            self.home_longitude_deg,
+            self.home_altitude_msl_m,
+            self.origin_above_home_m,
+        )

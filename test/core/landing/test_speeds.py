@@ -257,3 +257,9 @@ def test_a_descent_ends_where_the_lowest_height_does() -> None:
     alone, _ = flown(State.LANDING, 21.0, site)
     assert flown(State.LANDING, 25.0, site, above_lowest_m=4.0)[0] == pytest.approx(alone)
     assert flown(State.LANDING, 25.0, site, above_lowest_m=5.0)[0] == (0.0, 0.0, 0.0)
+
+
+def test_sideways_counts_the_lowest_height_that_is_believed() -> None:
+    far = site_at(40.0, 0.0)
+    assert flown(State.AIMING, 60.0, far, above_lowest_m=11.0)[0][0] > 1.0
+    assert flown(State.AIMING, 60.0, far, above_lowest_m=11.1)[0] == (0.0, 0.0, 0.0)

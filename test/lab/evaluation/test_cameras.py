@@ -11,7 +11,7 @@ from peace_ros.lab.evaluation import cameras
 from peace_ros.lab.evaluation.cameras import CASES, CameraLanding, land, main
 from peace_ros.lab.evaluation.wind import Landed, WindFlight
 
-GOOD = CameraLanding(Landed(1, True, 30.0, 0.3, 0.8, 19.8, 0.4, 0), 8.0, 8.5, 0.2)
+GOOD = CameraLanding(Landed(1, True, 30.0, 0.3, 0.8, 19.8, 0.4, 0, 0.0, 0.0, 8.5), 8.0, 8.5, 0.2)
 
 
 @pytest.mark.parametrize('case', CASES, ids=lambda case: case.name)
