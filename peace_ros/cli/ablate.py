@@ -21,6 +21,7 @@ from peace_ros.lab.evaluation.ablation.table import markdown, put_into
 from peace_ros.lab.evaluation.ablation.variants import default_variants
 from peace_ros.lab.evaluation.segmentation.cores import build_cores
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError
+from peace_ros.recording.run_folder import write_whole
 
 
 @with_options(ImageOptions)
@@ -52,7 +53,7 @@ def ablate(
 
     Takes the images that `peace evaluate` takes; each is encoded once for all variants.
     """
-    console = Console()
+    console = Console(markup=False)
     source, overrides = options.open(vocabularies=vocabularies)
     cores = build_cores(config, overrides)
     if isinstance(cores, str):
@@ -73,7 +74,7 @@ def ablate(
 
     def write_tables() -> None:
         if table is not None:
-            table.write_text(text, encoding='utf-8')
+            write_whole(table, text, 'table')
         if into is not None:
             put_into(into, text)
 

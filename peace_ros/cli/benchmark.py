@@ -27,6 +27,7 @@ from peace_ros.lab.benchmark.scene import TERMS_13
 from peace_ros.lab.benchmark.sweep import sweep as run_sweep
 from peace_ros.lab.benchmark.sweep import sweep_table
 from peace_ros.lab.benchmark.worker import run_apart
+from peace_ros.recording.run_folder import write_whole
 
 _CACHE = '~/.cache/peace_ros/benchmark'
 _RANDOM = 'random'
@@ -190,8 +191,8 @@ def _measure(name: str, **arguments: Any) -> Measured:
 
 def _write(text: str, figures: dict[str, Any], table: Path, json_file: Path | None) -> None:
     typer.echo(text)
-    table.write_text(text, encoding='utf-8')
+    write_whole(table, text, 'table')
     if json_file is not None:
         # What was not measured this time stays.
         kept = json.loads(json_file.read_text(encoding='utf-8')) if json_file.is_file() else {}
-        json_file.write_text(json.dumps({**kept, **figures}, indent=2) + '\n', encoding='utf-8')
+        write_whole(json_file, json.dumps({**kept, **figures}, indent=2) + '\n', 'figures')

@@ -22,4 +22,4 @@ def demo(*, options: DemoOptions) -> None:
         require('starlette', 'uvicorn', 'websockets')
     from peace_ros.simulation.demo.run import run_demo
 
-    raise typer.Exit(run_demo(options, Console()))
+    raise typer.Exit(run_demo(options, Console(markup=False)))

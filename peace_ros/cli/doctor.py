@@ -24,6 +24,7 @@ from peace_ros.core.presets import DEFAULT_PRESET, Preset, load_preset
 from peace_ros.core.vehicle import VehicleParameters, check_access
 from peace_ros.lab.doctor.finding import CheckResult, Finding
 from peace_ros.lab.doctor.run import DoctorOptions, as_json, examine, needs_mending
+from peace_ros.recording.run_folder import write_whole
 
 EXIT_MEND = 1
 _MARKS = {
@@ -68,7 +69,7 @@ def doctor(
     _show(found, taken_s, Console())
     if json_file is not None:
         text = json.dumps(as_json(found, taken_s), indent=2, allow_nan=False)
-        json_file.write_text(f'{text}\n', encoding='utf-8')
+        write_whole(json_file, f'{text}\n', 'findings')
     if needs_mending(found):
         raise typer.Exit(EXIT_MEND)
 

@@ -73,7 +73,8 @@ def evaluate(
 
     Give one of --dataset with --root, --images with --labels, --manifest, or --drawn.
     """
-    console = Console(soft_wrap=True, highlight=False)
+    # What is printed holds paths, which may look like markup.
+    console = Console(soft_wrap=True, highlight=False, markup=False)
     if save and max_false_safe is None:
         raise DatasetError('--save without --max-false-safe: there is no threshold to save')
     if threshold is not None and not 0.0 < threshold < 1.0:
@@ -97,7 +98,7 @@ def evaluate(
         cores.name: figures_of(cores, outcome.tallies[cores.name], outcome, threshold)
         for cores in configurations
     }
-    console.print(f'\n[bold]{source.title}[/bold]')
+    console.print(f'\n{source.title}', style='bold')
     console.print(figures_table(named), soft_wrap=False)
     for sentence in remarks_of(named, outcome):
         console.print(sentence)

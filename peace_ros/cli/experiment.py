@@ -14,6 +14,7 @@ from rich.table import Table
 from typer import Exit, Option
 
 from peace_ros.cli.extras import require
+from peace_ros.recording.run_folder import write_whole
 
 _PAPER_HZ = 0.82
 _INTERRUPTED = 130
@@ -92,7 +93,7 @@ def experiment(
         perception=Perception(rate, latency),
         limit_s=limit,
     )
-    store, console = FlightStore(out, settings), Console()
+    store, console = FlightStore(out, settings), Console(markup=False)
     columns = (
         TextColumn('{task.description}'),
         BarColumn(),
@@ -122,7 +123,7 @@ def experiment(
             raise Exit(_INTERRUPTED) from None
     told = figures(store.rows())
     if json_file is not None:
-        json_file.write_text(json.dumps(told, indent=2) + '\n', encoding='utf-8')
+        write_whole(json_file, json.dumps(told, indent=2) + '\n', 'figures')
     console.print(_table(told['groups']))
     console.print(f'flights: {store.path}', highlight=False)
 

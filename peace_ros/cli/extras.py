@@ -15,6 +15,8 @@ from pathlib import Path
 EXTRA_OF = {
     'rasterio': 'geo',
     'jinja2': 'lab',
+    'av': 'video',
+    'pyulog': 'logs',
     'psutil': 'lab',
     'matplotlib': 'simulation',
     'pyarrow': 'experiment',

@@ -59,7 +59,7 @@ def faults(
 
     Exit status 0 only when each did what is documented, without an unsafe hand-over or a crash.
     """
-    console = Console()
+    console = Console(markup=False)
     chosen = tuple(fault for fault in choose(only or ()) for _ in range(repeat))
     if show:
         for fault in FAULTS:

@@ -17,6 +17,7 @@ from peace_ros.lab.evaluation.segmentation.errors import DatasetError
 from peace_ros.lab.evaluation.segmentation.inputs import EvaluationInputs, open_source
 from peace_ros.lab.evaluation.segmentation.samples import SampleSource
 from peace_ros.lab.evaluation.segmentation.tiles import WHOLE
+from peace_ros.recording.run_folder import write_whole
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,7 @@ class ImageOptions(EvaluationInputs):
         """Write the figures where --json says, and what else there is; raises DatasetError."""
         try:
             if self.json_file is not None:
-                self.json_file.parent.mkdir(parents=True, exist_ok=True)
-                self.json_file.write_text(json.dumps(figures, indent=2) + '\n', encoding='utf-8')
+                write_whole(self.json_file, json.dumps(figures, indent=2) + '\n', 'figures')
             also()
         except OSError as error:
             raise DatasetError(f'{error.filename} cannot be written: {error.strerror}') from error

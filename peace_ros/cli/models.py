@@ -116,7 +116,8 @@ def models_export(
         typer.Argument(
             help='Hugging Face id (CIDAS/clipseg-rd64-refined, openai/clip-vit-base-patch32), '
             'local folder, OpenAI/OpenCLIP checkpoint; with --clip FastSAM-s.pt or -x.pt, or the '
-            '.onnx of one.'
+            '.onnx of one. Reading a .pt of FastSAM runs code that the file may hold: take it '
+            'from a source that you trust.'
         ),
     ],
     *,

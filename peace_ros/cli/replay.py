@@ -86,7 +86,7 @@ def replay(
     ] = None,
 ) -> None:
     """Run prompts, segmentation and landing over a recording; the vehicle cannot be moved."""
-    console = Console()
+    console = Console(markup=False)
     replayed = ReplayOptions(
         source,
         config,

@@ -35,7 +35,7 @@ def report(
     require('pyarrow', 'scipy', 'jinja2', 'matplotlib')
     from peace_ros.lab.experiment.report.page import ReportOptions, write_report
 
-    page, console = out or folder / 'report.html', Console()
+    page, console = out or folder / 'report.html', Console(markup=False)
     with console.status('drawing the pictures'):
         flights = write_report(folder, page, ReportOptions(pictures, tuple(strip or ()), charts))
     console.print(f'{page}: {flights} flights', highlight=False, soft_wrap=True)

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from peace_ros.core.inference import Bundle, ClipEncoder
 from peace_ros.lab.evaluation.words import load_frames, measure
+from peace_ros.recording.run_folder import write_whole
 
 
 def words(
@@ -34,7 +35,7 @@ def words(
     """Measure how often CLIP names the condition that a frame was put under, of ten."""
     frames = load_frames(images)[:limit]
     encoder = ClipEncoder(Bundle.load(clip))
-    console = Console()
+    console = Console(markup=False)
     watch = partial(track, description='images', console=console, transient=True)
     figures = measure(frames, encoder, seed=seed, strength=strength, watch=watch)
     table = Table('condition', 'named first', 'most often taken for')
@@ -46,4 +47,4 @@ def words(
     console.print(table)
     console.print(f'right word first: {100 * figures.right:.1f} % of {figures.counts.sum()} frames')
     if json_file is not None:
-        json_file.write_text(json.dumps(figures.as_json(), indent=2) + '\n', encoding='utf-8')
+        write_whole(json_file, json.dumps(figures.as_json(), indent=2) + '\n', 'figures')

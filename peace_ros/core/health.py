@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
+from itertools import pairwise
 
 from peace_ros.core.domain import Health, Level
 
@@ -15,6 +17,9 @@ LATENCY_S = 10.0
 AHEAD_S = 1.0
 """A stamp that lies further in the future was made by another clock."""
 _NS = 1e9
+_STAMPS = 100
+_FEW = 0.6
+"""Part of what is sent that arrives where a warning begins."""
 
 
 class WorkHealth:
@@ -39,6 +44,33 @@ class WorkHealth:
             return worst
 
 
+class LossWatch:
+    """Estimates from the stamps of a camera how many of its images are lost on the way.
+
+    Two images that both arrive are one period apart when none was lost between them. So the short
+    distances between stamps (their tenth percentile, against jitter) are the period; the time
+    from the first to the last stamp divided by it is what was sent. Where every second or third
+    image is lost with great regularity, this cannot be seen.
+    """
+
+    def __init__(self) -> None:
+        self._stamps_ns: deque[int] = deque(maxlen=_STAMPS)
+
+    def arrived(self, stamp_ns: int) -> None:
+        """Take the stamp of an image; a clock that goes back begins anew."""
+        if self._stamps_ns and stamp_ns <= self._stamps_ns[-1]:
+            self._stamps_ns.clear()
+        self._stamps_ns.append(stamp_ns)
+
+    def rates_hz(self) -> tuple[float, float] | None:
+        """Return how many are sent and how many arrive each second; None while it is not known."""
+        if len(self._stamps_ns) < _STAMPS // 2:
+            return None
+        distances = sorted(after - before for before, after in pairwise(self._stamps_ns))
+        mean_ns = (self._stamps_ns[-1] - self._stamps_ns[0]) / len(distances)
+        return _NS / distances[len(distances) // 10], _NS / mean_ns
+
+
 class InputWatch:
     """Watches one input of a node; may be used from several threads.
 
@@ -46,10 +78,12 @@ class InputWatch:
         noun: what arrives, such as ``image``.
         topic: its full name.
         began_s: steady clock, when the watch begins.
+        periodic: the messages come at one rate where none is lost, as those of a camera.
     """
 
-    def __init__(self, noun: str, topic: str, began_s: float) -> None:
+    def __init__(self, noun: str, topic: str, began_s: float, *, periodic: bool = False) -> None:
         self._noun, self._topic = noun, topic
+        self._losses = LossWatch() if periodic else None
         self._lock = threading.Lock()
         self._last_s, self._asked_s = began_s, began_s
         self._count = self._asked_count = 0
@@ -67,6 +101,8 @@ class InputWatch:
             self._last_s = now_s
             self._count += 1
             self._latency_s = (clock_ns - stamp_ns) / _NS
+            if self._losses is not None:
+                self._losses.arrived(stamp_ns)
 
     def health(self, now_s: float, sources: int) -> Health:
         """Return what is to be said of the input.
@@ -103,6 +139,13 @@ class InputWatch:
             return Level.ERROR, (
                 f'stamps on {self._topic} are {abs(self._latency_s):.1f} s {side} the clock of '
                 'this node: do both have one clock (use_sim_time, time synchronisation)?'
+            )
+        rates_hz = None if self._losses is None else self._losses.rates_hz()
+        if rates_hz is not None and rates_hz[1] < _FEW * rates_hz[0]:
+            return Level.WARN, (
+                f'{rates_hz[1]:.1f} messages per second arrive on {self._topic}, by their stamps '
+                f'about {rates_hz[0]:.0f} are sent: start their publisher with a shared-memory '
+                'segment that holds them (config/fastdds.xml), or choose image_transport compressed'
             )
         return Level.OK, f'{self._noun} arrives'
 

@@ -35,7 +35,8 @@ from peace_ros.core.prompting.pairs import prompt_from_pairs
 
 NANOSECONDS = 1_000_000_000
 CAMERA_FRAME = 'camera'
-_FLOAT_BYTES = 4
+_DEPTHS = {'32FC1': 'f4', '16UC1': 'u2'}
+"""Encoding of depth images -> kind of their values."""
 _LENGTHS = (0.9, 1.1)
 """Between which a quaternion's length counts as rounding; beyond, it is no rotation."""
 
@@ -151,18 +152,25 @@ def heatmap_levels(heatmap: Heatmap) -> NDArray[np.uint8]:
 
 
 def depth_from_image(message: Any) -> DepthImage:
-    """Return the depth image of a 32FC1 Image (metres); any other encoding is an ImageError."""
-    if message.encoding != '32FC1':
-        raise ImageError(f'depth encoding {message.encoding!r}: publish it as 32FC1, in metres')
-    row_bytes, size = message.width * _FLOAT_BYTES, message.height * message.step
+    """Return the depth of a 32FC1 (metres) or 16UC1 (millimetres, 0 unknown) Image, in metres.
+
+    Raises:
+        ImageError: another encoding, or the size is wrong.
+    """
+    if message.encoding not in _DEPTHS:
+        raise ImageError(f'depth encoding {message.encoding!r}: publish {" or ".join(_DEPTHS)}')
+    kind = np.dtype(_DEPTHS[message.encoding])
+    row_bytes, size = message.width * kind.itemsize, message.height * message.step
     if message.width < 1 or message.step < row_bytes or len(message.data) != size:
         raise ImageError(
             f'depth image {message.width} x {message.height}, {message.step} bytes per row: '
             f'{len(message.data)} bytes in place of {size}'
         )
     rows = np.frombuffer(bytes(message.data), np.uint8).reshape(message.height, message.step)
-    order = '>f4' if message.is_bigendian else '<f4'
+    order = kind.newbyteorder('>' if message.is_bigendian else '<')
     depth = np.ascontiguousarray(rows[:, :row_bytes]).view(order).astype(np.float32)
+    if kind.kind == 'u':
+        depth = np.where(depth > 0.0, depth / np.float32(1000.0), np.float32(np.nan))
     return DepthImage(depth, stamp_ns_of(message))
 
 

@@ -22,7 +22,7 @@ Group = tuple[str, type[Any]]
 FLYING_NODES = ('prompt_generator', 'segmentation', 'landing')
 RECORDER = 'recorder'
 """The node beside those that fly; it decides nothing."""
-SIMULATOR_NODES = ('satellite_view', 'autopilot_sim')
+OTHER_NODES = ('satellite_view', 'autopilot_sim', 'watch')
 """Their parameters are declared where they are, and checked when they start."""
 
 _TRANSPORTS = ('raw', 'compressed')
@@ -172,20 +172,33 @@ class LandingOptions(ParameterSet):
     )
     pose_source: str = parameter(
         'topic',
-        'With interface twist: pose from the topic pose (PoseStamped) or from tf',
+        'With interface twist: pose from the topic pose (PoseStamped), or from tf by the chain '
+        'from tf_parent to tf_child (REP-105: map, odom, base_link; needs tf2_ros)',
         choices=('topic', 'tf'),
     )
     tf_parent: str = parameter('map', 'Local frame (ENU) of the pose in tf')
     tf_child: str = parameter('base_link', 'Frame of the vehicle in tf')
     publish_tf: bool = parameter(
-        False, 'Publish tf_parent -> tf_child, where nothing else does (needs tf2_msgs)'
+        False,
+        'Publish tf_parent -> tf_child, and with mount_source parameters tf_child -> the frame of '
+        'the images, where nothing else does (needs tf2_msgs)',
     )
     mount_source: str = parameter(
         'parameters',
-        'How the camera is mounted: by the parameters mount_*, or by /tf_static from tf_child to '
-        'the optical frame (REP-103) that the images name in their header',
+        'How the camera is mounted: by the parameters mount_*, or by tf from tf_child to the '
+        'optical frame (REP-103) that the images name in their header (needs tf2_ros)',
         choices=('parameters', 'tf'),
     )
+
+    @property
+    def tf_frames(self) -> tuple[str, str]:
+        """Local frame and frame of the vehicle."""
+        return self.tf_parent, self.tf_child
+
+    @property
+    def takes_pose_topic(self) -> bool:
+        """Whether the pose of the vehicle comes over the topic ``pose``."""
+        return self.interface == 'twist' and self.pose_source == 'topic'
 
 
 @dataclass(frozen=True)

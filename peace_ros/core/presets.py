@@ -14,8 +14,8 @@ from peace_ros.core.domain import ConfigurationError
 from peace_ros.core.domain.parameters import describe
 from peace_ros.core.node_parameters import (
     FLYING_NODES,
+    OTHER_NODES,
     RECORDER,
-    SIMULATOR_NODES,
     converted,
     groups_of,
     is_of_ros,
@@ -94,10 +94,10 @@ class Preset:
         known = {node: named(groups_of(node)) for node in _CHECKED}
         for section, values in self.sections.items():
             node = _node_of(section)
-            if section not in WILDCARDS and node not in (*_CHECKED, *SIMULATOR_NODES):
+            if section not in WILDCARDS and node not in (*_CHECKED, *OTHER_NODES):
                 raise _unknown_section(self.path, section)
             for name in values:
-                if is_of_ros(name) or node in SIMULATOR_NODES:
+                if is_of_ros(name) or node in OTHER_NODES:
                     continue
                 try:
                     if section in WILDCARDS:
@@ -148,7 +148,7 @@ def _node_of(section: str) -> str:
 
 
 def _unknown_section(path: Path, section: str) -> ConfigurationError:
-    names = (*_CHECKED, *SIMULATOR_NODES)
+    names = (*_CHECKED, *OTHER_NODES)
     near = get_close_matches(section.rpartition('/')[2], names, n=1)
     remedy = f'did you mean {near[0]}?' if near else f'choose among {", ".join(names)}, /**'
     return ConfigurationError(f'{path}: node {section} is unknown: {remedy}')

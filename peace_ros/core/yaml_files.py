@@ -28,6 +28,9 @@ _REAL = re.compile(
     r'[-+]?((\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|inf|infinity|nan)|[-+]?\.inf|\.nan', re.IGNORECASE
 )
 _LONGEST_NUMBER = 64
+_LARGEST_BYTES = 16 << 20
+_MOST_VALUES = 200_000
+"""With every alias written out: nine lines of aliases to aliases may stand for a billion."""
 _PLAIN = '!plain'
 _DAMAGE = (yaml.YAMLError, ValueError, LookupError, AttributeError, RecursionError)
 """All that PyYAML raises on text that is no YAML, or on values that do not fit their tags."""
@@ -89,11 +92,34 @@ def read_yaml(path: Path, remedy: str) -> Any:
 
     """
     try:
-        return yaml.load(path.read_text(encoding='utf-8'), Loader=_Loader)  # noqa: S506 (a SafeLoader)
+        if (path.exists() and not path.is_file()) or path.stat().st_size > _LARGEST_BYTES:
+            raise ConfigurationError(
+                f'{path} is not a regular file of up to {_LARGEST_BYTES >> 20} MiB; {remedy}'
+            )
+        loader = _Loader(path.read_text(encoding='utf-8'))
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        if (values := _written_out(node, {})) > _MOST_VALUES:
+            raise yaml.YAMLError(f'{values:.2g} values, at most {_MOST_VALUES} are read')
+        return loader.construct_document(node)
     except OSError as error:
         raise ConfigurationError(f'{path}: {error.strerror}; {remedy}') from error
     except _DAMAGE as error:
-        raise ConfigurationError(f'{path}: not usable YAML ({error}); {remedy}') from error
+        reason = ' '.join(str(error).split())
+        raise ConfigurationError(f'{path}: not usable YAML ({reason}); {remedy}') from error
+
+
+def _written_out(node: yaml.Node, known: dict[int, int]) -> int:
+    """Return how many values a node stands for; a RecursionError where it holds itself."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    if id(node) not in known:
+        parts = node.value
+        if isinstance(node, yaml.MappingNode):
+            parts = [each for pair in parts for each in pair]
+        known[id(node)] = 1 + sum(_written_out(each, known) for each in parts)
+    return known[id(node)]
 
 
 def value_of(text: str) -> Any:

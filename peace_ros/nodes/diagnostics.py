@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 
 from peace_ros.core.domain import Health, Level
-from peace_ros.core.health import InputWatch, too_many
+from peace_ros.core.health import InputWatch
 from peace_ros.nodes.messages import header
 from peace_ros.nodes.qos import RESULT
 
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from peace_ros.nodes.node import PeaceNode
 
 _PERIOD_S = 1.0
-_ONE_SOURCE = ('image', 'image/compressed', 'prompt', 'heatmap', 'landing/status')
-"""Topics with one publisher at most; two of ``landing/status`` are two landing nodes."""
 _LEVELS = {
     Level.OK: DiagnosticStatus.OK,
     Level.WARN: DiagnosticStatus.WARN,
@@ -53,22 +51,28 @@ class Diagnostics:
         """Forget all tasks."""
         self._tasks.clear()
 
-    def watch(self, topic: str, unless: Callable[[], str] | None = None) -> Callable[[int], None]:
+    def watch(
+        self, topic: str, unless: Callable[[], str] | None = None, *, periodic: bool = False
+    ) -> Callable[[int], None]:
         """Watch an input; return what is to be called with the stamp (ns) of each message.
 
         Args:
-            topic: as it is subscribed to; its name says what arrives.
+            topic: as it is subscribed to; the last part of its name says what arrives.
             unless: returns why the input is of no use now, empty when it is.
+            periodic: a warning, also in the log, when many of its messages are lost.
         """
-        name = self._node.resolve_topic_name(topic)
-        watch = InputWatch(topic, name, time.monotonic())
+        name, noun = self._node.resolve_topic_name(topic), topic.rpartition('/')[2]
+        watch = InputWatch(noun, name, time.monotonic(), periodic=periodic)
 
         def check() -> Health:
             if unless is not None and (reason := unless()):
                 return Health(Level.OK, reason)
-            return watch.health(time.monotonic(), self._node.count_publishers(name))
+            found = watch.health(time.monotonic(), self._node.count_publishers(name))
+            if periodic and found.level is Level.WARN:
+                self._node.say(noun, found.sentence)
+            return found
 
-        self.add(topic, check)
+        self.add(noun, check)
         return lambda stamp_ns: watch.arrived(stamp_ns, self._node.clock_ns(), time.monotonic())
 
     def _publish(self) -> None:
@@ -87,12 +91,3 @@ class Diagnostics:
                 )
             )
         self._out.publish(message)
-
-
-def several_publishers(node: PeaceNode) -> str:
-    """Return which topic of a landing has more than one publisher; empty when none has."""
-    for topic in _ONE_SOURCE:
-        name = node.resolve_topic_name(topic)
-        if (count := node.count_publishers(name)) > 1:
-            return too_many(name, count)
-    return ''

@@ -106,7 +106,7 @@ class AfterHandover:
             if ended.is_set():
                 return
             try:
-                result = link.request_land()
+                result = link.request_land(lambda: not ended.is_set())
             except VehicleError as error:
                 self._say(f'landing after the hand-over: {error}')
             else:

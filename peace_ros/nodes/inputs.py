@@ -1,105 +1,36 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How nodes subscribe to images, and what the landing node hears."""
+"""What the landing node hears: callbacks only store."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from importlib import import_module
 from typing import Any
 
-from rclpy.node import Node
-from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, Image
 
-from peace_ros.core.domain import ConfigurationError, Frame, PeaceError
+from peace_ros.core.domain import ConfigurationError, PeaceError, Pose
 from peace_ros.core.landing import LandingCore
 from peace_ros.core.messages import (
-    camera_info_topic,
     depth_from_image,
     frame_from_message,
     heatmap_from_image,
-    is_rectified,
     stamp_ns_of,
 )
 from peace_ros.core.node_parameters import LandingOptions
-from peace_ros.core.transforms import StaticTransforms
+from peace_ros.core.vehicle import VehicleParameters
+from peace_ros.nodes.images import FRAME_INFO, ImageMessage, subscribe_images
 from peace_ros.nodes.node import PeaceNode
-from peace_ros.nodes.qos import IMAGE_IN, LATCHED_IN, RESULT
+from peace_ros.nodes.qos import IMAGE_IN, RESULT
+from peace_ros.nodes.sources import Sources
+from peace_ros.nodes.tf import TfMounts
 
-FRAME_INFO = 'heatmap/frame_info'
-"""CameraInfo of the frame that the heatmap of this stamp covers: its size is that of the frame, and
-K is 0 where the frame is not calibrated."""
 _WAITING = 4
 """Messages that are kept until the next step; older ones are dropped."""
 _FRAME_INFOS = 64
 """They may come before their heatmap, which is larger."""
-
-ImageMessage = Any
-"""An Image or a CompressedImage; rclpy's messages have no types to check."""
-
-
-def subscribe_images(node: Node, transport: str, callback: Callable[[ImageMessage], None]) -> str:
-    """Subscribe to ``image`` (transport raw) or its ``/compressed``; return the name of ``image``.
-
-    As with image_transport, ``image`` is the name that is remapped, whatever the transport. The
-    reliability may be overridden by the ROS parameters ``qos_overrides.<topic>...``.
-    """
-    base: str = node.resolve_topic_name('image')
-    kind, topic = (
-        (CompressedImage, f'{base}/compressed') if transport == 'compressed' else (Image, base)
-    )
-    node.create_subscription(
-        kind,
-        topic,
-        callback,
-        IMAGE_IN,
-        qos_overriding_options=QoSOverridingOptions.with_default_policies(),
-    )
-    return base
-
-
-def tf_message(parameter: str) -> Any:
-    """Return the message type of tf, which a parameter asks for.
-
-    Raises:
-        ConfigurationError: it is not installed.
-    """
-    try:
-        return import_module('tf2_msgs.msg').TFMessage
-    except ImportError as error:
-        raise ConfigurationError(
-            f'parameter {parameter} = tf needs the package tf2_msgs: install it with ROS, or leave '
-            f'{parameter} as it is by default'
-        ) from error
-
-
-class CalibratedImages:
-    """Images, and the ``camera_info`` beside them: its newest message is that of each image.
-
-    Args:
-        node: Subscribes.
-        transport: As for :func:`subscribe_images`.
-        callback: Gets each image message.
-    """
-
-    def __init__(
-        self, node: Node, transport: str, callback: Callable[[ImageMessage], None]
-    ) -> None:
-        self._info: CameraInfo | None = None
-        self._topic = subscribe_images(node, transport, callback)
-        node.create_subscription(
-            CameraInfo, camera_info_topic(self._topic), self._on_info, IMAGE_IN
-        )
-
-    def _on_info(self, message: CameraInfo) -> None:
-        self._info = message
-
-    def frame(self, message: ImageMessage) -> Frame:
-        """Return the frame of an image, with its camera; PeaceError says what is wrong."""
-        return frame_from_message(message, self._info, rectified=is_rectified(self._topic))
 
 
 class LandingInputs:
@@ -115,19 +46,27 @@ class LandingInputs:
 
     def __init__(self, node: PeaceNode, options: LandingOptions) -> None:
         self._node = node
+        self.sources = Sources(node, poses=options.takes_pose_topic)
+        """Whose data arrive: none is used while a topic has several publishers."""
         self._heatmaps: deque[Image] = deque(maxlen=_WAITING)
         self._frame_infos: deque[CameraInfo] = deque(maxlen=_FRAME_INFOS)
         self._depths: deque[Image] = deque(maxlen=_WAITING)
         self._images: deque[ImageMessage] = deque(maxlen=_WAITING)
         self._heatmap_arrived = node.diagnostics.watch('heatmap')
         node.create_subscription(Image, 'heatmap', self._on_heatmap, IMAGE_IN)
+        self._frame_info_arrived = node.diagnostics.watch(FRAME_INFO)
         node.create_subscription(CameraInfo, FRAME_INFO, self._on_frame_info, RESULT)
         node.create_subscription(Image, 'depth', self._on_depth, IMAGE_IN)
-        self._vehicle = options.tf_child
-        self._transforms = StaticTransforms() if options.mount_source == 'tf' else None
-        if self._transforms is not None:
-            kind = tf_message('mount_source')
-            node.create_subscription(kind, '/tf_static', self._transforms.add, LATCHED_IN)
+        self.camera_frame = ''
+        """The frame_id of the newest frame that has a heatmap, empty before."""
+        self._mounts: TfMounts | None = None
+        if options.mount_source == 'tf':
+            if node.filled(VehicleParameters).follow_gimbal:
+                raise ConfigurationError(
+                    'mount_source tf and vehicle.follow_gimbal both say how the camera is turned: '
+                    'choose one of them'
+                )
+            self._mounts = TfMounts(node, options.tf_child)
         if options.registration:
             subscribe_images(node, options.image_transport, self._on_image)
 
@@ -136,6 +75,7 @@ class LandingInputs:
         self._heatmaps.append(message)
 
     def _on_frame_info(self, message: CameraInfo) -> None:
+        self._frame_info_arrived(stamp_ns_of(message))
         self._frame_infos.append(message)
 
     def _on_depth(self, message: Image) -> None:
@@ -144,8 +84,22 @@ class LandingInputs:
     def _on_image(self, message: ImageMessage) -> None:
         self._images.append(message)
 
-    def feed(self, core: LandingCore) -> None:
-        """Hand on what has come since the last call; what cannot be read is said and dropped."""
+    def feed(self, core: LandingCore, poses: Sequence[Pose]) -> None:
+        """Hand on what has come since the last call; what cannot be read is said and dropped.
+
+        Args:
+            core: Gets it.
+            poses: Of the vehicle, since the last call.
+        """
+        if self._mounts is None:
+            core.distrust(self.sources.problem)
+            for pose in poses:
+                core.add_pose(pose)
+        else:
+            mounted = list(self._mounts.of(poses))
+            core.distrust(self.sources.problem or self._mounts.problem)
+            for pose, mount in mounted:
+                core.add_pose(pose, mount)
         inputs: tuple[tuple[str, deque[Any], Callable[[Any], None]], ...] = (
             ('image', self._images, lambda each: core.add_view(frame_from_message(each))),
             ('depth', self._depths, lambda each: core.add_depth(depth_from_image(each))),
@@ -163,12 +117,9 @@ class LandingInputs:
         if info is None:
             core.reject_heatmap(f'no {FRAME_INFO} of its stamp says what took its frame')
             return
-        if self._transforms is not None:
-            try:
-                core.place_camera(self._transforms.mount(self._vehicle, info.header.frame_id))
-            except ConfigurationError as error:
-                core.reject_heatmap(str(error))
-                raise
+        self.camera_frame = info.header.frame_id
+        if self._mounts is not None:
+            self._mounts.see(self.camera_frame)
         core.add_heatmap(heatmap_from_image(message, info))
 
     def _frame_info_of(self, heatmap: Image) -> CameraInfo | None:

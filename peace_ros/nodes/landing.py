@@ -18,14 +18,12 @@ from peace_ros.core.landing import (
     LandingCore,
     LandingParameters,
     State,
-    engagement_problem,
     readiness,
 )
 from peace_ros.core.mapping import MapParameters
 from peace_ros.core.node_parameters import CameraOptions, LandingOptions, groups_of
 from peace_ros.core.vehicle import VehicleParameters
 from peace_ros.nodes.connection import newest_telemetry
-from peace_ros.nodes.diagnostics import several_publishers
 from peace_ros.nodes.engagement import EngagementServices
 from peace_ros.nodes.inputs import LandingInputs
 from peace_ros.nodes.managed import ManagedNode
@@ -77,9 +75,9 @@ class LandingNode(ManagedNode):
         self.end_landing()
 
     def _create_core(self) -> LandingCore:
-        camera = self.filled(CameraOptions)
-        mount = None if self._options.mount_source == 'tf' else camera.mount
-        return LandingCore(self._landing, camera.camera, self.filled(MapParameters), mount)
+        camera, maps = self.filled(CameraOptions), self.filled(MapParameters)
+        on_gimbal = self.filled(VehicleParameters).follow_gimbal
+        return LandingCore(self._landing, camera.camera, maps, camera.mount, on_gimbal=on_gimbal)
 
     def change(self, filled: Mapping[type[Any], Any]) -> None:
         """Begin a new map with other thresholds; only while no landing is under way."""
@@ -99,15 +97,14 @@ class LandingNode(ManagedNode):
         at_ns = self.clock_ns()
         with self._lock:
             link = self._access.link
-            for pose in self._vision.poses(link):
-                self._core.add_pose(pose)
-            self._inputs.feed(self._core)
+            self._inputs.feed(self._core, self._vision.poses(link))
             told, age_s = newest_telemetry(link)
             decision = self._core.step(at_ns, told, age_s)
             self._submit(decision)
         access, sender = self._access, self._sending.state
         situation = VehicleSituation(told, age_s, access.problem, sender, access.stage, link)
         self._publisher.publish(decision, situation, at_ns)
+        self._view.camera_frame = self._inputs.camera_frame
         self._view.show(at_ns, decision, told, self._core)
         access.follow(decision)
         self._engagement.engage_when_ready()
@@ -127,18 +124,16 @@ class LandingNode(ManagedNode):
         """Return why a landing cannot begin now, empty when it can."""
         told, age_s = newest_telemetry(self._access.link)
         with self._lock:
-            map_age_s = self._core.map_age_s(self.clock_ns())
             return (
                 self.diagnostics.inactive
-                or several_publishers(self)
+                or self._inputs.sources.engagement_problem
                 or self._access.vehicle_problem
-                or engagement_problem(
-                    self._state, told, age_s, map_age_s, self._landing, self._core.last_rejection
-                )
+                or self._core.engagement_problem(self.clock_ns(), told, age_s)
             )
 
     def _readiness(self) -> Health:
-        return readiness(self._state, several_publishers(self), self.check_engagement())
+        several = self._inputs.sources.engagement_problem
+        return readiness(self._state, several, self.check_engagement())
 
     def begin(self) -> str:
         """Begin the landing of a vehicle that obeys; return what speaks against it, or nothing."""

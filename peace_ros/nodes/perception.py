@@ -1,6 +1,10 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Prompt generator and segmentation in one process: an image is received and decoded once."""
+"""Prompt generator and segmentation in one process.
+
+An image is received and decoded once, only the images that segmentation works on are described, and
+a prompt is handed on without a message.
+"""
 
 from __future__ import annotations
 
@@ -15,15 +19,15 @@ from peace_ros.nodes.sharing import SharedImages
 
 
 def create_nodes() -> tuple[PeaceNode, ...]:
-    """Create the nodes; segmentation subscribes to the images for both.
+    """Create the nodes; segmentation subscribes to the images for both, and to no prompts.
 
     Raises:
         PeaceError: as each of the nodes.
     """
     images = SharedImages()
-    segmentation = SegmentationNode(images=images)
+    segmentation = SegmentationNode(images=images, hears_prompts=False)
     try:
-        return segmentation, PromptGeneratorNode(images=images)
+        return segmentation, PromptGeneratorNode(images=images, hand_over=segmentation.take_prompt)
     except BaseException:
         segmentation.close()
         segmentation.destroy_node()

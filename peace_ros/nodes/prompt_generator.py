@@ -6,18 +6,18 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from peace_ros.core.domain import Health, Level, PeaceError
+from peace_ros.core.domain import Health, Level, PeaceError, Prompt
 from peace_ros.core.health import WorkHealth
 from peace_ros.core.messages import stamp_ns_of
 from peace_ros.core.node_parameters import PromptGeneratorOptions, groups_of
 from peace_ros.core.pipeline import create_generator
 from peace_ros.core.prompting import PromptGenerator, PromptingParameters, resolve_template
-from peace_ros.nodes.inputs import ImageMessage, subscribe_images
+from peace_ros.nodes.images import ImageMessage, subscribe_images
 from peace_ros.nodes.managed import ManagedNode
 from peace_ros.nodes.messages import prompt_to_message
 from peace_ros.nodes.qos import RESULT
@@ -33,13 +33,16 @@ class PromptGeneratorNode(ManagedNode):
         self,
         generator: PromptGenerator | None = None,
         images: SharedImages | None = None,
+        hand_over: Callable[[Prompt], None] = lambda _prompt: None,
         **options: Any,
     ) -> None:
         """Load the model and subscribe.
 
         Args:
             generator: in place of the one that the parameters describe.
-            images: which another node of this process subscribes to; None: this one does.
+            images: of another node of this process: only what it works on is described. None: this
+                node subscribes.
+            hand_over: takes each prompt besides, before it is published.
             options: of rclpy's Node.
 
         Raises:
@@ -47,7 +50,7 @@ class PromptGeneratorNode(ManagedNode):
 
         """
         super().__init__('prompt_generator', *groups_of('prompt_generator'), **options)
-        self._given, self._shared = generator, images
+        self._given, self._shared, self._hand_over = generator, images, hand_over
         self._images = images or SharedImages()
         self.start()
 
@@ -57,7 +60,7 @@ class PromptGeneratorNode(ManagedNode):
         self._generator = self._given or create_generator(parameters, self.get_logger())
         self._last_template = ''
         self._prompt_out = self.create_publisher(DiagnosticArray, 'prompt', RESULT)
-        self._image_arrived = self.diagnostics.watch('image')
+        self._image_arrived = self.diagnostics.watch('image', periodic=self._shared is None)
         self._work = WorkHealth()
         self.diagnostics.add('prompts', self._work.take)
         if self._shared is None:
@@ -68,7 +71,7 @@ class PromptGeneratorNode(ManagedNode):
     def activate(self) -> None:
         """Begin to describe frames."""
         self._worker = NewestWorker(self._generate, self._complain, self.fail, 'prompt_generator')
-        self._images.add(self._on_image)
+        self._images.add(self._on_image, when_begun=self._shared is not None)
 
     def deactivate(self) -> None:
         """Describe no further frame."""
@@ -94,6 +97,7 @@ class PromptGeneratorNode(ManagedNode):
     def _generate(self, message: ImageMessage) -> None:
         began = time.monotonic()
         prompt = self._generator.generate(self._images.frame(message))
+        self._hand_over(prompt)
         self._prompt_out.publish(prompt_to_message(prompt))
         if prompt.template != self._last_template:
             self._last_template = prompt.template

@@ -105,6 +105,7 @@ class PromptInput:
         options: template and timeout.
         embed: embeds the texts of a new sentence, in a thread of its own.
         complain: takes what is wrong with a prompt.
+        subscribe: they come over the topic; otherwise by :meth:`take_own`.
     """
 
     def __init__(
@@ -113,6 +114,8 @@ class PromptInput:
         options: SegmentationOptions,
         embed: Callable[[Prompt], None],
         complain: Callable[[PeaceError], None],
+        *,
+        subscribe: bool = True,
     ) -> None:
         self.static = static_prompt(options)
         """In place of prompts from the topic, None when they are awaited."""
@@ -123,7 +126,8 @@ class PromptInput:
         self._arrived = node.diagnostics.watch(
             'prompt', unless=lambda: '' if self.static is None else 'not used: static template'
         )
-        node.create_subscription(DiagnosticArray, 'prompt', self._on_prompt, RESULT)
+        if subscribe:
+            node.create_subscription(DiagnosticArray, 'prompt', self._on_prompt, RESULT)
 
     @property
     def is_empty(self) -> bool:
@@ -148,6 +152,12 @@ class PromptInput:
         self._board.close()
         self._worker.close()
 
+    def take_own(self, prompt: Prompt) -> None:
+        """Take a prompt that was made in this process; from any thread."""
+        self._arrived(prompt.stamp_ns)
+        if self.static is None:
+            self._put(prompt)
+
     def _on_prompt(self, message: DiagnosticArray) -> None:
         self._arrived(stamp_ns_of(message))
         if self.static is not None:
@@ -157,6 +167,9 @@ class PromptInput:
         except PeaceError as error:
             self._complain(error)
             return
+        self._put(prompt)
+
+    def _put(self, prompt: Prompt) -> None:
         # A new sentence is embedded in another thread; frames use the last one until then.
         if prompt.template in self._embedded:
             self._board.put(prompt)

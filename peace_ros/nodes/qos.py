@@ -18,9 +18,6 @@ IMAGE_OUT = QoSProfile(depth=1)
 IMAGE_IN = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Frames and heatmaps that we take; the oldest is dropped."""
 
-LATCHED_IN = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""/tf_static: what was published before we subscribed counts too."""
-
 POSE = QoSProfile(depth=20)
 """Poses: each counts, since a heatmap is projected with the pose at its stamp."""
 

@@ -24,7 +24,7 @@ from peace_ros.core.segmentation import (
     family_of,
     load_terms,
 )
-from peace_ros.nodes.inputs import FRAME_INFO, CalibratedImages, ImageMessage
+from peace_ros.nodes.images import FRAME_INFO, CalibratedImages, ImageMessage
 from peace_ros.nodes.managed import ManagedNode
 from peace_ros.nodes.messages import camera_info, heatmap_to_image, jpeg_message
 from peace_ros.nodes.prompts import PromptInput, prompt_of_another_frame, static_prompt
@@ -45,6 +45,8 @@ class SegmentationNode(ManagedNode):
         self,
         segmenter: Segmenter | None = None,
         images: SharedImages | None = None,
+        *,
+        hears_prompts: bool = True,
         **options: Any,
     ) -> None:
         """Load the model and subscribe.
@@ -52,6 +54,7 @@ class SegmentationNode(ManagedNode):
         Args:
             segmenter: in place of the one that the parameters describe.
             images: gets the images for the other nodes of this process, too.
+            hears_prompts: they come over the topic; otherwise by :meth:`take_prompt`.
             options: of rclpy's Node.
 
         Raises:
@@ -59,7 +62,7 @@ class SegmentationNode(ManagedNode):
 
         """
         super().__init__(_NAME, *groups_of(_NAME), **options)
-        self._given = segmenter
+        self._given, self._hears_prompts = segmenter, hears_prompts
         self._images = images or SharedImages()
         self.start()
 
@@ -70,10 +73,12 @@ class SegmentationNode(ManagedNode):
         self._heatmap_out = self.create_publisher(Image, 'heatmap', IMAGE_OUT)
         self._frame_info_out = self.create_publisher(CameraInfo, FRAME_INFO, RESULT)
         self._overlay_out = self.create_publisher(CompressedImage, 'overlay/compressed', IMAGE_OUT)
-        self._image_arrived = self.diagnostics.watch('image')
+        self._image_arrived = self.diagnostics.watch('image', periodic=True)
         self._work = WorkHealth()
         self.diagnostics.add('heatmaps', self._work.take)
-        self._prompts = PromptInput(self, self._options, self._embed, self._complain)
+        self._prompts = PromptInput(
+            self, self._options, self._embed, self._complain, subscribe=self._hears_prompts
+        )
         calibrated = CalibratedImages(self, self._options.image_transport, self._images.offer)
         self._images.decode = calibrated.frame
         waits = 'waits for prompts' if self._prompts.static is None else 'static'
@@ -114,12 +119,18 @@ class SegmentationNode(ManagedNode):
         self._options, self._pipeline.segmenter = options, segmenter
         self._prompts.change(options)
 
+    def take_prompt(self, prompt: Prompt) -> None:
+        """Take a prompt of the generator in this process; from any thread."""
+        prompts = vars(self).get('_prompts')  # none while the node is unconfigured
+        if prompts is not None:
+            prompts.take_own(prompt)
+
     def _embed(self, prompt: Prompt) -> None:
         self._pipeline.segmenter.prepare(prompt)
 
     def _on_image(self, message: ImageMessage) -> None:
         self._image_arrived(stamp_ns_of(message))
-        if self._prompts.is_empty:
+        if self._hears_prompts and self._prompts.is_empty:
             self.say(
                 'waiting',
                 'no prompt has arrived yet, but frames have: is prompt_generator running?',
@@ -128,6 +139,7 @@ class SegmentationNode(ManagedNode):
         self._worker.offer(message)
 
     def _segment(self, message: ImageMessage) -> None:
+        self._images.begin(message)
         chosen = self._prompts.take(stamp_ns_of(message))
         if chosen is None:
             return

@@ -19,23 +19,36 @@ class SharedImages:
 
     def __init__(self) -> None:
         self._takers: list[_Take] = []
+        self._helpers: list[_Take] = []
         self._lock = threading.Lock()
         self.decode: Callable[[Any], Frame] = frame_from_message
         """By whoever subscribes, who may know the camera."""
         self._decoded: tuple[Any, Frame] | None = None
 
-    def add(self, take: _Take) -> None:
-        """Hand the images from now on to ``take``, too."""
-        self._takers.append(take)
+    def add(self, take: _Take, *, when_begun: bool = False) -> None:
+        """Hand the images from now on to ``take``, too.
+
+        Args:
+            take: must not block.
+            when_begun: only those that another node begins to work on, see :meth:`begin`: of a
+                fast camera that is a part of them.
+        """
+        (self._helpers if when_begun else self._takers).append(take)
 
     def remove(self, take: _Take) -> None:
         """Hand it no further image."""
-        if take in self._takers:
-            self._takers.remove(take)
+        for takers in (self._takers, self._helpers):
+            if take in takers:
+                takers.remove(take)
 
     def offer(self, message: Any) -> None:
         """Hand on an image."""
         for take in tuple(self._takers):
+            take(message)
+
+    def begin(self, message: Any) -> None:
+        """Hand an image to those who help with it, as work on it begins."""
+        for take in tuple(self._helpers):
             take(message)
 
     def frame(self, message: Any) -> Frame:

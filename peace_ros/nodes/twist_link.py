@@ -30,7 +30,7 @@ class TwistLink:
     problem = ''
     """Nothing: a topic is always there, and the age of the pose is looked at elsewhere."""
     position_problem = ''
-    """Nothing."""
+    """Why the newest pose cannot be used, until one that can; whoever reads the poses sets it."""
     warning = ''
     """Nothing."""
     counts = LineCounts()
@@ -50,14 +50,17 @@ class TwistLink:
             if newest is not None and 0 <= newest.stamp_ns - pose.stamp_ns <= _RESTART_NS:
                 return
             self._poses.append(pose)
+            self.position_problem = ''
             self._newest, self._received_ns = pose, time.monotonic_ns()
 
     def telemetry(self) -> Telemetry:
         """Return the newest pose as telemetry of an armed, obedient, flying vehicle."""
         with self._lock:
+            problem = self.position_problem
             return Telemetry(
-                self._received_ns,
-                self._newest,
+                time.monotonic_ns() if problem else self._received_ns,
+                None if problem else self._newest,
+                position_problem=problem,
                 armed=True,
                 in_control=True,
                 mode='TWIST',
@@ -100,11 +103,13 @@ class TwistLink:
         self._publish(Twist())
         return RequestResult(Answer.ACCEPTED)
 
-    def request_land(self) -> RequestResult:
+    def request_land(self, _wanted: Callable[[], bool] = lambda: True) -> RequestResult:
         """Refuse: such a vehicle has no modes."""
         return _NO_MODES
 
-    request_level_hold = request_land
+    def request_level_hold(self) -> RequestResult:
+        """Refuse: such a vehicle has no modes."""
+        return _NO_MODES
 
     def stop_at_once(self) -> bool:
         """Stop the vehicle."""

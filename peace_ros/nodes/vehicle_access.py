@@ -8,21 +8,21 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from geometry_msgs.msg import PoseStamped, Twist
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from rclpy.clock import Clock, ClockType
 
-from peace_ros.core.domain import Pose, VehicleError
+from peace_ros.core.domain import ConfigurationError, PeaceError, Pose, VehicleError
 from peace_ros.core.landing import Decision, State
-from peace_ros.core.messages import pose_from_message, pose_from_transform
+from peace_ros.core.messages import pose_from_message, pose_from_transform, stamp_ns_of
 from peace_ros.core.node_parameters import LandingOptions
 from peace_ros.core.vehicle import VehicleLink, VehicleParameters, check_access, open_vehicle
 from peace_ros.nodes.connection import Connection
 from peace_ros.nodes.handover import AfterHandover
-from peace_ros.nodes.inputs import tf_message
 from peace_ros.nodes.node import PeaceNode
 from peace_ros.nodes.qos import COMMAND, POSE_IN
+from peace_ros.nodes.tf import TfTree
 from peace_ros.nodes.twist_link import TwistLink
 
 _TRY_S = 3.0
@@ -170,25 +170,26 @@ class VehicleAccess:
 
     def _subscribe_pose(self, options: LandingOptions) -> None:
         if options.pose_source == 'topic':
+            self._pose_arrived = self._node.diagnostics.watch('pose')
             self._node.create_subscription(PoseStamped, 'pose', self._on_pose, POSE_IN)
             return
-
-        def on_tf(message: Any) -> None:
-            for each in message.transforms:
-                names = (each.header.frame_id.lstrip('/'), each.child_frame_id.lstrip('/'))
-                if names == (options.tf_parent, options.tf_child):
-                    self._take(pose_from_transform, each)
-
-        self._node.create_subscription(tf_message('pose_source'), '/tf', on_tf, POSE_IN)
+        look_up = partial(TfTree(self._node, 'pose_source').look_up, *options.tf_frames)
+        self._node.create_timer(
+            1.0 / options.rate,
+            lambda: self._take(lambda: pose_from_transform(look_up())),
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
 
     def _on_pose(self, message: PoseStamped) -> None:
-        self._take(pose_from_message, message)
+        self._pose_arrived(stamp_ns_of(message))
+        self._take(partial(pose_from_message, message))
 
-    def _take(self, read: Callable[[Any], Pose], message: Any) -> None:
-        try:
-            pose = read(message)
-        except VehicleError as error:
-            self._node.say('pose', str(error))
+    def _take(self, read: Callable[[], Pose]) -> None:
+        if self._twist is None:
             return
-        if self._twist is not None:
-            self._twist.add_pose(pose)
+        try:
+            self._twist.add_pose(read())
+        except PeaceError as error:
+            self._node.say('pose', str(error))
+            if isinstance(error, ConfigurationError):
+                self._twist.position_problem = str(error)

@@ -11,9 +11,9 @@ from peace_ros.core.domain import ConfigurationError, Health, Level, PeaceError,
 from peace_ros.core.node_parameters import CameraOptions, LandingOptions
 from peace_ros.core.odometry import OdometryParameters
 from peace_ros.core.threads import GuardedThread
-from peace_ros.core.vehicle import MavlinkLink, VehicleLink
+from peace_ros.core.vehicle import MavlinkLink, VehicleLink, VehicleParameters
 from peace_ros.core.vision_feed import VisionFeed
-from peace_ros.nodes.inputs import CalibratedImages, ImageMessage
+from peace_ros.nodes.images import CalibratedImages, ImageMessage
 from peace_ros.nodes.node import PeaceNode
 
 _PERIOD_S = 0.02
@@ -49,6 +49,11 @@ class VisionOutput:
             raise ConfigurationError(
                 f'parameter vision_position with interface {options.interface} and mount_source '
                 f'{options.mount_source}: it needs mavlink and parameters'
+            )
+        if node.filled(VehicleParameters).follow_gimbal:
+            raise ConfigurationError(
+                'parameter vision_position with vehicle.follow_gimbal: the camera must not move '
+                'against the vehicle; set one of them to false'
             )
         self._calibrated = CalibratedImages(node, options.image_transport, self._on_image)
         node.diagnostics.add('vision', self._health)

@@ -20,14 +20,13 @@ from pathlib import Path
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from peace_ros import __version__
 from peace_ros.core.domain import Health, Level
 from peace_ros.core.messages import camera_info_topic, diagnostic_values, is_rectified
 from peace_ros.core.node_parameters import RECORDER, RecorderParameters, groups_of
 from peace_ros.nodes.node import PeaceNode
-from peace_ros.nodes.qos import LATCHED_IN
 from peace_ros.nodes.runtime import run
 from peace_ros.recorder.flight_file import DAMAGE, TYPESTORE, Note
 from peace_ros.recorder.frames import FrameChoice
@@ -38,6 +37,8 @@ from peace_ros.recorder.writer import FlightWriter
 _NICE = 10
 _SMALL_IN = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 """A reader that asks for delivery could make a publisher wait."""
+_LATCHED_IN = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""/tf_static: what was published before we subscribed counts too."""
 _LARGE_IN = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 """More than one, because this process gets the processor last."""
 _NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
@@ -113,7 +114,7 @@ class RecorderNode(PeaceNode):
         else:
             self._subscribe(image, _IMAGE, _LARGE_IN, self._on_image)
         self._subscribe(camera_info_topic(image), _INFO, _LARGE_IN, self._on_info)
-        self._subscribe(_TF_STATIC, _TF, LATCHED_IN, self._noting(_TF_STATIC, _TF, latched=True))
+        self._subscribe(_TF_STATIC, _TF, _LATCHED_IN, self._noting(_TF_STATIC, _TF, latched=True))
 
     def _subscribe(
         self, topic: str, kind: str, profile: QoSProfile, callback: Callable[[bytes], None]

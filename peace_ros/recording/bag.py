@@ -28,13 +28,10 @@ from rosbags.rosbag2 import (
     Writer,
     WriterError,
 )
-from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from peace_ros.core.domain import RecordingError
 from peace_ros.recording.storages import (
-    MCAP_ERRORS,
-    ROSBAGS_ERRORS,
     STORAGES,
     Storages,
     TopicOfFile,
@@ -46,15 +43,6 @@ TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 """Message classes of ROS 2 Jazzy, shared by all readers and writers of the package."""
 
 _ROS1 = get_typestore(Stores.ROS1_NOETIC)
-_UNREADABLE: tuple[type[Exception], ...] = (
-    *ROSBAGS_ERRORS,
-    *MCAP_ERRORS,
-    SerdeError,
-    TypesysError,
-    OSError,
-    AssertionError,
-)
-"""What the readers let out, beside their own errors, on files that are cut short or overwritten."""
 
 
 @final
@@ -84,8 +72,7 @@ class BagReader:
             self._storages = Storages(self.path)
         except RecordingError:
             raise
-        except Exception as error:
-            # apsw and zstd bring error types of their own, which are not imported here.
+        except Exception as error:  # of the readers, their databases and codecs
             raise self._unreadable(error) from error
         return self
 
@@ -141,7 +128,9 @@ class BagReader:
         try:
             for raw in self._opened().messages(topics):
                 yield raw.topic.name, raw.stamp_ns, _deserialised(raw.data, raw.topic)
-        except _UNREADABLE as error:
+        except RecordingError:
+            raise
+        except Exception as error:  # of the readers, their databases, codecs and type stores
             raise self._unreadable(error) from error
 
     def _opened(self) -> Storages:

@@ -58,10 +58,12 @@ def write_whole(path: Path, content: bytes | str, what: str) -> None:
     """
     partial = path.with_name(f'.{path.name}.partial')
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         partial.write_bytes(content if isinstance(content, bytes) else content.encode())
         partial.replace(path)
     except OSError as error:
-        partial.unlink(missing_ok=True)
+        with suppress(OSError):  # what stands in the way may also stand here
+            partial.unlink()
         raise RecordingError(
             f'{what} {path} cannot be written ({error}): give a folder that is writable'
         ) from error

@@ -8,6 +8,7 @@ topics, services and the kind of storage may be missing or older than the files.
 
 from __future__ import annotations
 
+import shutil
 import struct
 import tempfile
 from abc import ABC, abstractmethod
@@ -18,17 +19,16 @@ from heapq import merge
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import yaml
 import zstandard
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from rosbags.rosbag1 import Reader as Ros1Reader
-from rosbags.rosbag1 import ReaderError as Ros1ReaderError
-from rosbags.rosbag2 import Reader, ReaderError
+from rosbags.rosbag2 import Reader
 
-from peace_ros.core.domain import RecordingError
+from peace_ros.core.domain import ConfigurationError, RecordingError
+from peace_ros.core.yaml_files import read_yaml
 
 STORAGES = ('.mcap', '.db3', '.bag')
 COMPRESSED = ('.zstd', '.zst')
@@ -45,6 +45,8 @@ MCAP_ERRORS: tuple[type[Exception], ...] = (
     KeyError,
     IndexError,
     TypeError,
+    OverflowError,
+    MemoryError,
 )
 """What mcap lets out on files that are cut short or overwritten, beside its own errors."""
 
@@ -93,7 +95,7 @@ class McapStorage(RecordingFile):
         self._file = path.open('rb')
         try:
             self._reader: SeekingReader | None = SeekingReader(
-                self._file, record_size_limit=_LARGEST_RECORD
+                self._file, validate_crcs=True, record_size_limit=_LARGEST_RECORD
             )
             counted = self._by_summary(self._reader)
             if counted is None:
@@ -163,7 +165,7 @@ class McapStorage(RecordingFile):
         self._file.seek(0)
         whole = 0
         try:
-            reader = StreamReader(self._file, record_size_limit=_LARGEST_RECORD)
+            reader = StreamReader(self._file, validate_crcs=True, record_size_limit=_LARGEST_RECORD)
             for record in reader.records:
                 whole += isinstance(record, Message)
                 yield record
@@ -246,8 +248,7 @@ class Storages:
         if path.suffix.lower() in COMPRESSED:
             folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
             whole = folder / path.stem
-            with path.open('rb') as source, whole.open('wb') as target:
-                zstandard.ZstdDecompressor().copy_stream(source, target)
+            _unpack(path, whole)
             path = whole
         return McapStorage(path) if path.suffix.lower() == '.mcap' else RosbagsStorage(_plain(path))
 
@@ -259,6 +260,8 @@ def files_of(path: Path) -> list[Path]:
         RecordingError: there is none, or the metadata of the folder cannot be used.
     """
     if not path.is_dir():
+        if not path.is_file():
+            raise RecordingError(f'{path} is a device or a pipe: give a file')
         return [path]
     metadata = path / 'metadata.yaml'
     if not metadata.is_file():
@@ -266,10 +269,12 @@ def files_of(path: Path) -> list[Path]:
             f'folder {path} holds no metadata.yaml: give a bag folder, or its .mcap or .db3'
         )
     try:
-        content = yaml.safe_load(metadata.read_text(encoding='utf-8'))
+        content = read_yaml(metadata, 'give the .mcap or .db3 itself')
         listed = content['rosbag2_bagfile_information']['relative_file_paths']
         files = [path / Path(str(each)).name for each in listed]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
+    except ConfigurationError as error:
+        raise RecordingError(str(error)) from error
+    except (KeyError, TypeError, ValueError) as error:  # ValueError: a name with a NUL
         raise RecordingError(
             f'{metadata} does not tell the files of the bag ({type(error).__name__}): '
             'give the .mcap or .db3 itself'
@@ -281,6 +286,20 @@ def files_of(path: Path) -> list[Path]:
             'give the .mcap or .db3 itself'
         )
     return files
+
+
+def _unpack(packed: Path, whole: Path) -> None:
+    """Unpack a file into at most half of the room that is free."""
+    most = left = shutil.disk_usage(whole.parent).free // 2
+    with packed.open('rb') as source, whole.open('wb') as target:
+        for part in zstandard.ZstdDecompressor().read_to_iter(source):
+            left -= len(part)
+            if left < 0:
+                raise RecordingError(
+                    f'{packed} is larger than {most >> 20} MiB when unpacked, half of what '
+                    f'{whole.parent.parent} has free: unpack it elsewhere and give the .mcap'
+                )
+            target.write(part)
 
 
 def is_recording(path: Path) -> bool:
@@ -310,6 +329,3 @@ def _decompressed(data: bytes) -> bytes:
     if data[:4] == _ZSTD:
         return zstandard.ZstdDecompressor().decompressobj().decompress(data)
     return data
-
-
-ROSBAGS_ERRORS: tuple[type[Exception], ...] = (ReaderError, Ros1ReaderError)

@@ -1,22 +1,45 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Video files: frames with an assumed altitude profile, and writing overlays as a video."""
+"""Video files: frames with their own times, an assumed altitude, and overlays as a video.
+
+Files are read with PyAV (libav), which comes with the extra ``video`` and is imported only here.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from heapq import heappop, heappush
 from pathlib import Path
-from typing import final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import Frame, Pose, RecordingError
+from peace_ros.core.domain import Pose, RecordingError
+from peace_ros.core.images import MAX_PIXELS
 
-VIDEO_SUFFIXES = ('.mp4', '.avi', '.mkv', '.mov', '.webm', '.m4v')
+if TYPE_CHECKING:
+    from av.container import InputContainer
+    from av.video.stream import VideoStream
 
+VIDEO_SUFFIXES = ('.mp4', '.avi', '.mkv', '.mov', '.webm', '.m4v', '.ts')
+FIRST_STAMP_NS = 1_000_000_000
+"""Of the first frame of a video."""
+LONGEST_S = 12 * 3600.0
+"""Longest video: longer ones are files with damaged times."""
+
+_FORMATS = 'mov,matroska,avi,mpegts'
+"""Containers of libav. Not its play lists: they may name other files and addresses."""
+_ASSUMED_HZ = 25.0
+_ENDS_EARLY_S = 2.0
+"""Sound may end after the last picture, and the last picture is shown for a while."""
+_ONE_FRAME_PER_PACKET = ('h264', 'hevc')
+"""Codecs whose decoders may leave out a damaged frame without an error."""
+_POSE_STEP_NS = 100_000_000
+_QUARTER_DEG = 90
 _LEVEL_NORTH = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -54,69 +77,197 @@ class AltitudeProfile:
         """Return metres above the ground at a fraction (0 to 1) of the video."""
         return self.start_m + fraction * (self.end_m - self.start_m)
 
+    def poses(self, begin_ns: int, end_ns: int) -> list[Pose]:
+        """Return poses at 10 Hz from the first to the last frame: level, nose north, one place."""
+        steps = max(1, -((begin_ns - end_ns) // _POSE_STEP_NS))
+        stamps = np.linspace(begin_ns, max(end_ns, begin_ns + 1), steps + 1)
+        found = []
+        for step, stamp in enumerate(stamps):
+            altitude = self.at(step / steps)
+            found.append(Pose(round(stamp), 0.0, 0.0, -altitude, _LEVEL_NORTH, altitude))
+        return found
 
+
+class VideoPicture(NamedTuple):
+    """One frame of a video."""
+
+    stamp_ns: int
+    rgb: NDArray[np.uint8] | None
+    """Height x width x 3, turned as the file says; None where it cannot be decoded."""
+    fault: str = ''
+    """Why it cannot be decoded."""
+
+
+@final
 class VideoReader:
-    """The frames of a video file, one at a time, with level poses at the origin."""
+    """The frames of a video file, one at a time, at the times that the file gives them.
 
-    def __init__(
-        self, path: Path, altitude: AltitudeProfile, frame_hz: float | None = None
-    ) -> None:
-        """Open a file.
+    Frames are counted by reading the file: the header of a live recording does not tell their
+    number, and with a variable frame rate it does not tell their times.
+    """
 
-        ``frame_hz`` is the rate at which the camera took the frames, where the file was written
-        to play faster than real time; the file's own rate when None.
+    def __init__(self, path: Path) -> None:
+        """Read the times of all frames.
 
         Raises:
-            RecordingError: the file is missing or no video that OpenCV reads.
+            RecordingError: the file is missing or not a video, or its codec is not known here.
         """
-        if not path.is_file():
-            raise RecordingError(f'video {path} does not exist: give a video file')
         self.path = path
-        self._altitude = altitude
-        capture = cv2.VideoCapture(str(path))
-        self.count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT)) if capture.isOpened() else 0
-        file_hz = capture.get(cv2.CAP_PROP_FPS) if capture.isOpened() else 0.0
-        capture.release()
-        if self.count < 1:
+        self.remarks: list[str] = []
+        """What the user has to know of the file, such as where it breaks off."""
+        with self._opened() as (container, stream):
+            times = sorted(_packet_times(container, stream))
+            if not times:
+                raise RecordingError(
+                    f'video {path} holds no frames: give an intact file of '
+                    f'{", ".join(VIDEO_SUFFIXES)}'
+                )
+            self._begin_s = times[0]
+            self.count = len(times)
+            announced_s = (container.duration or 0) * 1e-6
+            if stream.frames > self.count or announced_s > times[-1] - times[0] + _ENDS_EARLY_S:
+                self.remarks.append(
+                    f'the video announces {stream.frames or "some"} frames in {announced_s:.1f} s, '
+                    f'{self.count} are there in {times[-1] - times[0]:.1f} s: it is cut short'
+                )
+            self.codec = stream.codec_context.codec.canonical_name
+        span_s = times[-1] - times[0]
+        if span_s > LONGEST_S:
             raise RecordingError(
-                f'video {path} holds no frames that OpenCV can read: give H.264 or MPEG-4 in one '
-                f'of {", ".join(VIDEO_SUFFIXES)}'
+                f'video {path}: its frames span {span_s / 3600.0:.3g} h, the limit is '
+                f'{LONGEST_S / 3600.0:g} h: cut it, or repair its times'
             )
-        self.frame_hz = frame_hz or (file_hz if file_hz > 0.0 else 25.0)
+        self.end_ns = self._stamp_ns(times[-1])
+        self.frame_hz = (self.count - 1) / span_s if span_s > 0.0 else _ASSUMED_HZ
+        """Mean rate of the frames."""
 
-    def frames(self) -> Iterator[tuple[int, Frame]]:
-        """Yield (index, frame) from the first to the last; stamps begin at one second.
+    def pictures(self) -> Iterator[VideoPicture]:
+        """Yield the frames in the order of their times.
+
+        A frame that cannot be decoded comes with its fault, and so do those after it up to the
+        next key frame, which are changes of it.
 
         Raises:
-            RecordingError: decoding breaks off in the middle.
+            RecordingError: none can be decoded, or the file cannot be read any more.
         """
-        capture = cv2.VideoCapture(str(self.path))
-        try:
-            index = 0
-            while True:
-                there, image = capture.read()
-                if not there or image is None:
-                    break
-                rgb = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8)
-                yield index, Frame(rgb, self.stamp_ns(index))
-                index += 1
-        finally:
-            capture.release()
-        # Containers count a frame or two more than they hold; a broken file lacks many.
-        if index < 0.9 * self.count:
+        last_s, decoded, lost = self._begin_s - 1.0 / self.frame_hz, 0, 0
+        damaged = told = ''
+        with self._opened() as (container, stream):
+            for frame in _decoded(container, stream):
+                if isinstance(frame, Exception):
+                    lost += 1
+                    damaged = told = f'{self.codec} data cannot be decoded ({_reason(frame)})'
+                    continue
+                time_s = last_s + 1.0 / self.frame_hz if frame.time is None else frame.time
+                last_s, stamp_ns = time_s, self._stamp_ns(time_s)
+                decoded += 1
+                damaged = '' if frame.key_frame and not frame.is_corrupt else damaged
+                if damaged or frame.is_corrupt:
+                    fault = damaged or f'{self.codec} data is damaged'
+                    yield VideoPicture(stamp_ns, None, f'{fault}: give an intact file')
+                    continue
+                yield VideoPicture(stamp_ns, self._upright(frame))
+        if lost:
+            self.remarks.append(f'{lost} places of the video cannot be decoded; the last: {told}')
+        if not decoded:
             raise RecordingError(
-                f'video {self.path} breaks off after {index} of {self.count} frames: give an '
-                'intact file'
+                f'video {self.path}: none of {self.count} frames can be decoded, codec '
+                f'{self.codec}{f": {told}" if told else ""}: convert it to H.264'
             )
 
-    def stamp_ns(self, index: int) -> int:
-        """Return the stamp of a frame."""
-        return 1_000_000_000 + round(index * 1e9 / self.frame_hz)
+    def _stamp_ns(self, time_s: float) -> int:
+        return FIRST_STAMP_NS + round((time_s - self._begin_s) * 1e9)
 
-    def pose(self, index: int) -> Pose:
-        """Return the assumed pose of a frame: level, nose north, above the origin."""
-        altitude = self._altitude.at(min(1.0, index / max(1, self.count - 1)))
-        return Pose(self.stamp_ns(index), 0.0, 0.0, -altitude, _LEVEL_NORTH, altitude)
+    def _upright(self, frame: Any) -> NDArray[np.uint8]:
+        turn_deg = int(frame.rotation) % 360
+        if turn_deg % _QUARTER_DEG:
+            raise RecordingError(
+                f'video {self.path} is to be turned by {turn_deg} deg: only quarter turns are '
+                'known; remove the rotation, or convert it'
+            )
+        if turn_deg and not any('turned' in each for each in self.remarks):
+            self.remarks.append(
+                f'frames are turned by {turn_deg} deg, counter-clockwise, as the file says'
+            )
+        rgb: NDArray[np.uint8] = np.asarray(frame.to_ndarray(format='rgb24'), np.uint8)
+        return np.ascontiguousarray(np.rot90(rgb, turn_deg // _QUARTER_DEG))
+
+    @contextmanager
+    def _opened(self) -> Iterator[tuple[InputContainer, VideoStream]]:
+        """Open the file and choose its stream; errors of libav become a RecordingError."""
+        import av  # noqa: PLC0415 -- optional: the extra "video"
+
+        if not self.path.is_file():
+            raise RecordingError(f'video {self.path} is not a file: give a video file')
+        try:
+            options = {'format_whitelist': _FORMATS, 'protocol_whitelist': 'file'}
+            with av.open(f'file:{self.path}', options=options) as container:
+                yield container, self._stream(container)
+        except (av.FFmpegError, ValueError, MemoryError) as error:
+            raise RecordingError(
+                f'video {self.path} cannot be read ({_reason(error)}): give an intact file of '
+                f'{", ".join(VIDEO_SUFFIXES)}'
+            ) from error
+
+    def _stream(self, container: InputContainer) -> VideoStream:
+        # Cover pictures are streams as well, of one frame.
+        streams = [each for each in container.streams.video if not _is_cover(each)]
+        if not streams:
+            raise RecordingError(f'video {self.path} holds no stream of pictures: give another')
+        stream = streams[0]
+        if stream.codec_context is None:
+            raise RecordingError(
+                f'video {self.path}: this libav cannot decode its codec: convert it to H.264'
+            )
+        width, height = stream.codec_context.width, stream.codec_context.height
+        if width * height > MAX_PIXELS:
+            raise RecordingError(
+                f'video {self.path} of {width} x {height} px: the limit is {MAX_PIXELS} pixels: '
+                'give a smaller one'
+            )
+        # A decoder that goes on after an error invents what is missing.
+        stream.codec_context.options = {'err_detect': 'explode'}
+        return stream
+
+
+def _is_cover(stream: VideoStream) -> bool:
+    return 'attached_pic' in str(stream.disposition)
+
+
+def _packet_times(container: InputContainer, stream: VideoStream) -> Iterator[float]:
+    """Yield the times of the packets that hold frames, in seconds, in the order of the file."""
+    for number, packet in enumerate(container.demux(stream)):
+        if not packet.size:
+            continue
+        ticks = packet.dts if packet.pts is None else packet.pts
+        hz = float(stream.average_rate or _ASSUMED_HZ)
+        yield number / hz if ticks is None else float(ticks * packet.time_base)
+
+
+def _decoded(container: InputContainer, stream: VideoStream) -> Iterator[Any]:
+    """Yield frames, and an error in place of each packet that gives none."""
+    import av  # noqa: PLC0415 -- optional
+
+    is_whole = stream.codec_context.codec.canonical_name in _ONE_FRAME_PER_PACKET
+    waiting: list[int] = []
+    for packet in container.demux(stream):
+        if is_whole and packet.size and packet.pts is not None:
+            heappush(waiting, packet.pts)
+        try:
+            for frame in packet.decode():
+                # Frames come in the order of their times, so that earlier ones are lost.
+                lost = 0
+                while waiting and frame.pts is not None and waiting[0] <= frame.pts:
+                    lost += heappop(waiting) < frame.pts
+                if lost:
+                    yield ValueError(f'{lost} frames are missing')
+                yield frame
+        except av.FFmpegError as error:
+            yield error
+
+
+def _reason(error: Exception) -> str:
+    return str(getattr(error, 'strerror', None) or error).strip()
 
 
 @final
@@ -129,6 +280,7 @@ class VideoWriter:
         self._partial = path.with_name(f'.{path.stem}.partial{path.suffix}')
         self._writer: cv2.VideoWriter | None = None
         self._size: tuple[int, int] | None = None
+        self._written = 0
 
     def __enter__(self) -> VideoWriter:
         """Return itself; the file is created with the first frame, which gives its size."""
@@ -156,14 +308,32 @@ class VideoWriter:
                 f'video {self.path}: frame of {size} px after ones of {self._size}'
             )
         self._writer.write(cv2.cvtColor(image_rgb, cv2.COLOR_RGB2BGR))
+        self._written += 1
 
     def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
-        """Put the file in its place, or remove it after an error."""
+        """Put the file in its place, or remove it after an error.
+
+        Raises:
+            RecordingError: the file is not whole, such as on a full disk.
+        """
         writer, self._writer = self._writer, None
         if writer is None:
             return
         writer.release()
-        if error_type is None:
-            self._partial.replace(self.path)
-        else:
+        try:
+            if error_type is None:
+                self._check()
+                self._partial.replace(self.path)
+        finally:
             self._partial.unlink(missing_ok=True)
+
+    def _check(self) -> None:
+        """Count the frames in the file: OpenCV gives no error when the disk takes no more."""
+        written = cv2.VideoCapture(str(self._partial))
+        count = round(written.get(cv2.CAP_PROP_FRAME_COUNT)) if written.isOpened() else 0
+        written.release()
+        if count != self._written:
+            raise RecordingError(
+                f'video {self.path} cannot be written, {count} of {self._written} frames are in '
+                'the file: give a folder that has room'
+            )

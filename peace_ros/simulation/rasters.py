@@ -1,6 +1,6 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Image and label files -> arrays: JPEG, PNG and the like by OpenCV, TIFF and GeoTIFF by rasterio.
+"""Image and label files -> arrays; TIFF and GeoTIFF by rasterio, others by picture_files.
 
 rasterio comes with the extra ``geo`` and is imported only for TIFF files and PNGs with a palette.
 """
@@ -16,31 +16,25 @@ from math import atan2, degrees, hypot, isclose, isfinite, sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import WorldError
+from peace_ros.simulation.picture_files import RasterError, bytes_of, check_size, decoded
 
 IMAGE_SUFFIXES = ('.jpg', '.jpeg', '.png', '.tif', '.tiff', '.bmp', '.webp')
-MAX_PIXELS = 400_000_000
-MAX_SIDE_PX = 32_766
-"""OpenCV's warps address pixels with 16 bits."""
 WHITE_PERCENT = 99.8
 """Images of 16 bits are scaled so that this share of their values lies below white."""
 
 _TIFF = (b'II*\0', b'MM\0*', b'II+\0', b'MM\0+')
-_PNG, _JPEG = b'\x89PNG\r\n\x1a\n', b'\xff\xd8'
+_PNG = b'\x89PNG\r\n\x1a\n'
 _PNG_PALETTE = 3
+_WITH_ALPHA = (2, 4)
+"""Numbers of bands of which the last is alpha."""
 _SAME = 0.01
 """Relative difference of two lengths that count as equal."""
 _NORTH_DEG = 10.0
 """Angle between up and north that still counts as north: the convergence of usual projections."""
 _GSD_REMEDY = 'give gsd, the ground sampling distance in metres per pixel'
-
-
-class RasterError(WorldError):
-    """An image or label file that cannot be read as it should be."""
 
 
 class Photo(NamedTuple):
@@ -50,6 +44,8 @@ class Photo(NamedTuple):
     """Height x width x 3, RGB."""
     known: NDArray[np.bool_] | None
     """Height x width, false where the file has no data or is transparent; None: true everywhere."""
+    orientation: int = 1
+    """Of EXIF: how the stored pixels were turned to be upright, 1 is not at all."""
 
 
 def read_photo(path: Path) -> Photo:
@@ -58,25 +54,31 @@ def read_photo(path: Path) -> Photo:
     Raises RasterError when the file or a part of it cannot be read, when it is too large, or when
     nobody can tell which of its bands are red, green and blue.
     """
-    data = _bytes_of(path)
+    data = bytes_of(path)
     known: NDArray[np.bool_] | None
+    orientation = 1
     if data[:4] in _TIFF:
         with _opened(path) as dataset:
             values, known = _bands(dataset, path)
     else:
-        values, known = _decoded_colour(data, path)
+        picture = decoded(data, path)
+        orientation, values = picture.orientation, picture.upright()
+        known = values[..., -1] > 0 if values.shape[2] in _WITH_ALPHA else None
+        values = values[..., :3] if values.shape[2] >= 3 else np.repeat(values[..., :1], 3, axis=2)
+        if orientation != 1:
+            _tell_turning()
     known = None if known is None or known.all() else known
-    return Photo(np.ascontiguousarray(_eight_bit(values, known, path)), known)
+    return Photo(np.ascontiguousarray(_eight_bit(values, known, path)), known, orientation)
 
 
 def read_indices(path: Path) -> NDArray[Any]:
     """Return height x width of class indices, of PNGs with a palette too; raises RasterError."""
-    data = _bytes_of(path)
+    data = bytes_of(path)
     if data[:4] in _TIFF or (data[:8] == _PNG and data[25] == _PNG_PALETTE):
         with _opened(path) as dataset:
             raster = np.moveaxis(_read(dataset, path, list(dataset.indexes)), 0, -1)
     else:
-        raster = np.atleast_3d(_decoded(data, cv2.IMREAD_UNCHANGED, path))
+        raster = decoded(data, path).pixels
     colours = raster[..., :3]
     if (colours != colours[..., :1]).any():
         raise RasterError(
@@ -92,75 +94,10 @@ def read_gsd_m(path: Path) -> float:
     Raises RasterError for other files, for pixels that are not square, for images whose upper edge
     is not north, and for a reference system that does not tell metres on the ground.
     """
-    if _bytes_of(path)[:4] not in _TIFF:
+    if bytes_of(path)[:4] not in _TIFF:
         raise RasterError(f'{path} has no ground sampling distance of its own: {_GSD_REMEDY}')
     with _opened(path) as dataset:
         return _gsd_m(dataset, path)
-
-
-def check_size(width_px: int, height_px: int, name: str | Path) -> None:
-    """Raise RasterError when an image is too large."""
-    if width_px * height_px > MAX_PIXELS or max(width_px, height_px) > MAX_SIDE_PX:
-        raise RasterError(
-            f'{name} of {width_px} x {height_px} px is over the limit of '
-            f'{MAX_PIXELS // 1_000_000} Mpx and {MAX_SIDE_PX} px a side: '
-            'cut it or use a larger ground sampling distance'
-        )
-
-
-def _bytes_of(path: Path) -> bytes:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise RasterError(
-            f'{path} cannot be read ({error.strerror}): give an existing image file'
-        ) from error
-    if len(data) < 26:
-        raise RasterError(f'{path} holds {len(data)} bytes: give a JPEG, PNG or TIFF image')
-    if data[:2] == _JPEG and b'\xff\xd9' not in data[-65536:]:
-        raise RasterError(
-            f'{path} ends after {len(data)} bytes without the end mark of a JPEG: it is cut short, '
-            'copy it again'
-        )
-    return data
-
-
-def _decoded(data: bytes, flags: int, path: Path) -> NDArray[Any]:
-    if (size := _declared_size(data)) is not None:
-        check_size(*size, path)
-    try:
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-    except cv2.error as error:
-        raise RasterError(f'{path} cannot be decoded ({error.err}): recompress it') from error
-    if image is None:
-        raise RasterError(
-            f'{path} of {len(data)} bytes is not a readable image: give a JPEG, PNG or TIFF image'
-        )
-    return np.asarray(image)
-
-
-def _decoded_colour(data: bytes, path: Path) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
-    # Only this flag turns by EXIF, and only the other one keeps the transparency.
-    flags = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH
-    image = _decoded(data, flags if data[:2] == _JPEG else cv2.IMREAD_UNCHANGED, path)
-    image = np.repeat(np.atleast_3d(image), 3, axis=2) if image.ndim == 2 else image
-    known = image[..., 3] > 0 if image.shape[2] == 4 else None
-    return image[..., 2::-1], known
-
-
-def _declared_size(data: bytes) -> tuple[int, int] | None:
-    """Return (width, height) from the header of a PNG or JPEG, before the pixels are decoded."""
-    if data[:8] == _PNG:
-        return int.from_bytes(data[16:20], 'big'), int.from_bytes(data[20:24], 'big')
-    at = 2 if data[:2] == _JPEG else len(data)
-    while at + 9 <= len(data) and data[at] == 0xFF:
-        marker = data[at + 1]
-        # Start-of-frame markers carry the size; C4, C8 and CC are tables.
-        if 0xC0 <= marker <= 0xCF and marker not in {0xC4, 0xC8, 0xCC}:
-            height = int.from_bytes(data[at + 5 : at + 7], 'big')
-            return int.from_bytes(data[at + 7 : at + 9], 'big'), height
-        at += 2 + int.from_bytes(data[at + 2 : at + 4], 'big')
-    return None
 
 
 @contextmanager
@@ -255,6 +192,13 @@ def _eight_bit(
     sampled = sampled if known is None else sampled[known[::step, ::step]]
     white = max(1.0, float(np.percentile(sampled, WHITE_PERCENT))) if sampled.size else 1.0
     return np.asarray(np.clip(values * np.float32(255.0 / white), 0.0, 255.0), np.uint8)
+
+
+@cache
+def _tell_turning() -> None:
+    logging.getLogger(__name__).warning(
+        'photos with an EXIF orientation are turned upright, labels are taken to be so already'
+    )
 
 
 @cache

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from peace_ros.core.domain import Label, WorldError
 from peace_ros.simulation.drawing.town import MIXED, draw_town
-from peace_ros.simulation.rasters import check_size, read_gsd_m, read_indices, read_photo
+from peace_ros.simulation.picture_files import check_size
+from peace_ros.simulation.rasters import read_gsd_m, read_indices, read_photo
 
 
 @dataclass(frozen=True)

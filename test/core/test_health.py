@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from peace_ros.core.domain import Health, Level
@@ -68,3 +69,52 @@ def test_a_failure_between_two_reports_is_not_hidden_by_a_later_success():
     work.put(Health(Level.OK, 'running'))
     assert work.take().sentence == 'no'
     assert work.take().sentence == 'running'
+
+
+def lossy(watch, arrives, rate_hz=30.0, jitter_s=0.0, seconds=10.0):
+    """Let those images of a camera arrive that ``arrives`` lets pass; return the finding."""
+    rng = np.random.default_rng(1)
+    now_s = 100.0
+    for number in range(int(seconds * rate_hz)):
+        now_s = 100.0 + number / rate_hz
+        stamp_ns = NOW_NS + round((number / rate_hz + jitter_s * rng.standard_normal()) * 1e9)
+        if arrives(rng, number):
+            watch.arrived(stamp_ns, stamp_ns + 10**7, now_s)
+    return watch.health(now_s, 1)
+
+
+@pytest.fixture
+def camera():
+    return InputWatch('image', TOPIC, 100.0, periodic=True)
+
+
+@pytest.mark.parametrize('part', [0.2, 0.4])
+def test_images_that_are_lost_on_the_way_are_a_warning_with_both_rates(camera, part):
+    found = lossy(camera, lambda rng, _number: rng.random() < part, seconds=30.0)
+    assert found.level is Level.WARN
+    assert 'about 30 are sent' in found.sentence
+    arriving_hz = float(found.sentence.split()[0])
+    assert arriving_hz == pytest.approx(30.0 * part, rel=0.25)
+    assert 'config/fastdds.xml' in found.sentence
+
+
+@pytest.mark.parametrize('rate_hz', [5.0, 30.0])
+def test_a_camera_that_loses_little_or_is_slow_is_fine(camera, rate_hz):
+    found = lossy(
+        camera,
+        lambda rng, _number: rng.random() < 0.9,
+        rate_hz=rate_hz,
+        jitter_s=0.1 / rate_hz,
+        seconds=60.0,
+    )
+    assert found.level is Level.OK
+
+
+def test_losses_are_judged_of_cameras_only_and_after_some_images(watch, camera):
+    assert lossy(watch, lambda rng, _number: rng.random() < 0.2).level is Level.OK
+    assert lossy(camera, lambda rng, _number: rng.random() < 0.2, seconds=3.0).level is Level.OK
+
+
+def test_a_clock_that_goes_back_is_no_loss(camera):
+    lossy(camera, lambda rng, _number: rng.random() < 0.2, seconds=30.0)
+    assert lossy(camera, lambda _rng, _number: True).level is Level.OK

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 from math import inf, isnan
 from pathlib import Path
 
@@ -116,6 +117,31 @@ def test_a_section_that_holds_itself_is_refused(tmp_path, text):
     path.write_text(text)
     with pytest.raises(ConfigurationError, match='not usable YAML'):
         read_sections(path)
+
+
+def test_aliases_that_stand_for_a_billion_values_are_refused(tmp_path) -> None:
+    lines = ['l0: &l0 [x, x, x, x, x, x, x, x, x, x]']
+    lines += [f'l{k}: &l{k} [{", ".join([f"*l{k - 1}"] * 10)}]' for k in range(1, 10)]
+    path = tmp_path / 'bomb.yaml'
+    path.write_text('\n'.join(lines))
+    with pytest.raises(ConfigurationError, match='values, at most 200000 are read') as told:
+        read_yaml(path, 'give another')
+    assert '\n' not in str(told.value)
+
+
+def test_deep_nesting_is_one_sentence(tmp_path) -> None:
+    path = tmp_path / 'deep.yaml'
+    path.write_text('a: ' + '[' * 20_000)
+    with pytest.raises(ConfigurationError, match='not usable YAML') as told:
+        read_yaml(path, 'give another')
+    assert '\n' not in str(told.value)
+
+
+def test_devices_and_pipes_are_not_read(tmp_path) -> None:
+    os.mkfifo(tmp_path / 'pipe.yaml')
+    for path in (tmp_path / 'pipe.yaml', Path('/dev/zero')):
+        with pytest.raises(ConfigurationError, match='not a regular file'):
+            read_yaml(path, 'give another')
 
 
 def test_a_single_value_is_read_as_on_the_command_line():

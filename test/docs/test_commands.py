@@ -25,7 +25,7 @@ import typer
 
 from peace_ros.cli import main as command_line
 from peace_ros.cli.options import for_typer
-from peace_ros.core.node_parameters import FLYING_NODES, RECORDER, SIMULATOR_NODES, named
+from peace_ros.core.node_parameters import FLYING_NODES, OTHER_NODES, RECORDER, named
 from peace_ros.core.presets import preset_names
 from peace_ros.lab.parameter_docs import NODE_PARAMETERS
 
@@ -60,6 +60,7 @@ NOT_RUN = {
     'peace models': 'downloads, or takes minutes; test/lab/export and test/cli',
     'peace replay': 'a recording of the reader; test/lab/replay',
     'peace report': 'reads an experiment; test/lab/experiment',
+    'peace watch': 'serves a page until Ctrl-C; test/watch and test/cli',
     'peace words': 'images of the reader; test/lab/evaluation',
     'peace world': 'a map server of the reader; test/simulation/tiles and test/cli',
     'peace <verb>': 'no command, but the form of all',
@@ -67,6 +68,7 @@ NOT_RUN = {
     'rviz2': 'has no wheels; a test holds the topics of its file against those of the node',
     'python -m': 'minutes, or a page that another test compares; the module is checked',
     'python -c': 'makes a network of the true size',
+    'python test/watch/measure.py': 'a browser and a node for a while; a measurement',
     'python test/mutants.py': 'takes hours',
     'pip': 'changes the environment; extras are checked',
     'pre-commit': 'changes the checkout',
@@ -221,7 +223,7 @@ def _check_peace(words: tuple[str, ...]) -> None:
 
 def _check_ros(words: tuple[str, ...]) -> None:
     if words[1:3] == ('run', 'peace_ros') and words[3] != 'peace':
-        names = (*FLYING_NODES, RECORDER, *SIMULATOR_NODES, 'watch')
+        names = (*FLYING_NODES, RECORDER, *OTHER_NODES)
         executables = {name: (name,) for name in names}
         executables['perception'] = ('prompt_generator', 'segmentation')
         assert words[3] in executables

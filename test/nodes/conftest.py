@@ -23,7 +23,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from peace_ros.core.domain import Camera, Heatmap, Pose
 from peace_ros.core.vehicle import VehicleParameters, open_vehicle
 from peace_ros.nodes import qos
-from peace_ros.nodes.inputs import FRAME_INFO
+from peace_ros.nodes.images import FRAME_INFO
 from peace_ros.nodes.messages import camera_info, heatmap_to_image, image_message, pose_to_message
 from peace_ros.nodes.node import PeaceNode
 from peace_ros.simulation.demo.pilot import Pilot

@@ -9,7 +9,9 @@ from functools import partial
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from sensor_msgs.msg import Image
+from geometry_msgs.msg import PoseStamped
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
@@ -62,15 +64,18 @@ def test_the_level_of_the_landing_is_its_readiness(bench, ready):
     ('kind', 'topic'),
     [
         (Image, 'image'),
+        (CameraInfo, 'camera_info'),
         (DiagnosticArray, 'prompt'),
         (Image, 'heatmap'),
+        (CameraInfo, 'heatmap/frame_info'),
+        (PoseStamped, 'pose'),
         (DiagnosticArray, 'landing/status'),
     ],
 )
 def test_nothing_is_engaged_while_a_topic_has_two_publishers(bench, ready, kind, topic):
     node, found, see = ready
     intruders = [bench.peer.create_publisher(kind, topic, 1)]
-    if topic in {'image', 'prompt'}:
+    if topic in {'image', 'camera_info', 'prompt'}:
         intruders.append(bench.peer.create_publisher(kind, topic, 1))
     bench.until(lambda: f'publishers of /{topic}' in node.check_engagement(), see)
     bench.until(lambda: bool(found) and 'nothing is engaged' in found[-1].message, see)
@@ -78,3 +83,23 @@ def test_nothing_is_engaged_while_a_topic_has_two_publishers(bench, ready, kind,
     for intruder in intruders:
         bench.peer.destroy_publisher(intruder)
     bench.until(lambda: not node.check_engagement(), see)
+
+
+def test_the_topics_of_a_remapped_camera_count_under_their_own_names(bench):
+    node = LandingNode(
+        cli_args=['--ros-args', '-r', 'image:=/belly/image_raw'],
+        parameter_overrides=[Parameter('interface', value='twist')],
+    )
+    bench.spin(node)
+    try:
+        for kind, topic in (
+            (CompressedImage, '/belly/image_raw/compressed'),
+            (CameraInfo, '/belly/camera_info'),
+        ):
+            pair = [bench.peer.create_publisher(kind, topic, 1) for _ in range(2)]
+            bench.until(lambda topic=topic: f'2 publishers of {topic}' in node.check_engagement())
+            for each in pair:
+                bench.peer.destroy_publisher(each)
+            bench.until(lambda: 'publishers' not in node.check_engagement())
+    finally:
+        node.close()

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -33,8 +34,9 @@ class Link:
     def send_landing_target(self, site: tuple[float, float, float], _pose: Pose) -> None:
         self.targets.append(site)
 
-    def request_land(self) -> RequestResult:
+    def request_land(self, wanted: Callable[[], bool] = lambda: True) -> RequestResult:
         self.asked += 1
+        self.wanted = wanted
         if self.lands_in:
             self.told = replace(self.told, mode=self.lands_in, in_control=False)
         return RequestResult(self.answers.pop(0) if self.answers else Answer.REFUSED, 'no')
@@ -62,6 +64,18 @@ def test_land_is_asked_for_once() -> None:
     link = Link()
     assert 'lands by itself' in follow('land', link)[0]
     assert (link.targets, link.asked) == ([], 1)
+
+
+def test_a_disengagement_withdraws_the_request_to_land() -> None:
+    link = Link()
+    after = AfterHandover('land', lambda _sentence: None)
+    after.follow(link, SITE, handed_over=True)
+    until = time.monotonic() + 2.0
+    while not link.asked and time.monotonic() < until:
+        time.sleep(0.01)
+    assert link.wanted()
+    after.follow(link, SITE, handed_over=False)
+    assert not link.wanted()
 
 
 def test_a_refusal_is_told_and_ends_after_three(monkeypatch: pytest.MonkeyPatch) -> None:

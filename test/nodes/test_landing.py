@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, Twist, TwistStamped
+from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
 from peace_ros.core.domain import Camera, ConfigurationError, Pose
@@ -134,6 +135,28 @@ def test_holds_with_zero_velocity_when_the_heatmaps_stop(bench, values_of):
     assert set(still) == {(0.0, 0.0, 0.0)}
 
 
+@pytest.mark.parametrize('topic', ['heatmap', 'prompt'])
+def test_holds_while_a_second_publisher_may_say_what_is_safe(bench, values_of, topic):
+    statuses = listen(bench)
+    commands = bench.heard(Twist, 'cmd_vel', qos.COMMAND)
+    node = bench.run(LandingNode, interface='twist')
+    flight = Flight(bench, node)
+    kind = Image if topic == 'heatmap' else DiagnosticArray
+    first = None if topic == 'heatmap' else bench.peer.create_publisher(kind, topic, 1)
+    bench.until(lambda: call(bench, 'engage', flight).success, flight)
+    bench.until(lambda: any(each.linear.z < -0.3 for each in commands), flight)
+    intruder = bench.peer.create_publisher(kind, topic, 1)
+    bench.until(lambda: state_of(statuses, values_of) == 'HOLD', flight)
+    assert f'2 publishers of /{topic}' in values_of(statuses[-1])['reason']
+    commands.clear()
+    bench.until(lambda: len(commands) > 5, flight)
+    still = [(each.linear.x, each.linear.y, each.linear.z) for each in commands[1:]]
+    assert set(still) == {(0.0, 0.0, 0.0)}
+    bench.peer.destroy_publisher(intruder)
+    bench.until(lambda: any(each.linear.z < -0.3 for each in commands), flight)
+    assert first is None or bench.peer.count_publishers(f'/{topic}') == 1
+
+
 def test_engages_by_itself_only_when_told_so(bench, values_of):
     statuses = listen(bench)
     node = bench.run(LandingNode, interface='twist', auto_engage=True)
@@ -146,7 +169,7 @@ def test_tf_needs_the_package_that_the_wheels_lack(bench):
     try:
         import tf2_msgs  # noqa: F401
     except ImportError:
-        with pytest.raises(ConfigurationError, match='tf2_msgs'):
+        with pytest.raises(ConfigurationError, match='tf2_ros'):
             bench.run(LandingNode, interface='twist', pose_source='tf')
 
 

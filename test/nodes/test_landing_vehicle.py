@@ -239,7 +239,7 @@ def test_with_vision_position_the_autopilot_is_told_how_it_moves(
     found = bench.findings('vision')
     node = bench.run(LandingNode, mavlink=hovering.tcp_url, vision_position=True)
     camera = Camera352(bench, node, hovering)
-    bench.until(lambda: bool(found) and found[-1].level == b'\x00', camera.see)
+    bench.until(lambda: bool(found) and found[-1].level == b'\x00', camera.see, within_s=60.0)
     inject(hovering, 'gps_loss')
     if autopilot == 'ardupilot':
         hovering.flight.estimator.use_source(2)

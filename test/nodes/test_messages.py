@@ -91,11 +91,20 @@ def test_a_depth_image_keeps_metres_and_stamp(pad, order):
     assert back.stamp_ns == STAMP
 
 
-def test_a_depth_image_of_millimetres_or_with_bytes_missing_is_refused():
-    millimetres = depth_message(np.ones((2, 2), np.float32))
-    millimetres.encoding = '16UC1'
-    with pytest.raises(ImageError, match='32FC1'):
-        readers.depth_from_image(millimetres)
+@pytest.mark.parametrize('order', ['<u2', '>u2'])
+def test_a_depth_image_of_millimetres_comes_out_in_metres(order):
+    message = depth_message(np.array([[1500, 0, 65535]]), 2, order)
+    message.encoding, message.is_bigendian = '16UC1', int(order == '>u2')
+    back = readers.depth_from_image(message)
+    np.testing.assert_allclose(back.depth_m, [[1.5, np.nan, 65.535]])
+    assert back.depth_m.dtype == np.float32
+
+
+def test_a_depth_image_of_another_encoding_or_with_bytes_missing_is_refused():
+    colours = depth_message(np.ones((2, 2), np.float32))
+    colours.encoding = 'rgb8'
+    with pytest.raises(ImageError, match='32FC1 or 16UC1'):
+        readers.depth_from_image(colours)
     cut = depth_message(np.ones((2, 2), np.float32))
     cut.data = cut.data[:8]
     with pytest.raises(ImageError, match='8 bytes in place of 16'):

@@ -40,6 +40,19 @@ def test_an_image_is_decoded_once_for_all_who_take_it(frame):
     assert len(got) == 3
 
 
+def test_who_helps_gets_only_the_images_that_work_begins_on():
+    images, helped = SharedImages(), []
+    images.add(helped.append, when_begun=True)
+    images.add(lambda _message: None)
+    for message in ('first', 'second', 'third'):
+        images.offer(message)
+    images.begin('second')
+    assert helped == ['second']
+    images.remove(helped.append)
+    images.begin('third')
+    assert helped == ['second']
+
+
 def test_an_image_that_cannot_be_decoded_is_an_error_for_each(frame):
     images = SharedImages()
 
@@ -82,6 +95,9 @@ def test_one_process_makes_prompts_and_heatmaps_with_the_stamp_of_the_frame(
     bench.until(lambda: bool(prompts) and bool(heatmaps), see)
     assert {stamp_ns_of(prompts[0]), stamp_ns_of(heatmaps[0])} <= set(stamps)
     assert bench.peer.count_subscribers('drone_1/image') == 1
+    ours = {'prompt_generator', 'segmentation'}
+    hearing = bench.peer.get_subscriptions_info_by_topic('/drone_1/prompt')
+    assert not ours & {each.node_name for each in hearing}, 'prompts need no message here'
     nodes = {'drone_1/prompt_generator: image', 'drone_1/segmentation: image'}
     bench.until(lambda: nodes <= {each.name for array in found for each in array.status}, see)
     began_s = time.monotonic()

@@ -12,6 +12,7 @@ import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from mcap.reader import make_reader
+from mcap.stream_reader import MAGIC_SIZE
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from peace_ros.core.domain import Camera, Pose
@@ -41,6 +42,8 @@ def file_of(folder: Path) -> Path:
 
 
 def topics_of(folder: Path) -> dict[str, int]:
+    if file_of(folder).stat().st_size < MAGIC_SIZE:
+        return {}  # just begun
     with BagReader(file_of(folder)) as bag:
         return {topic: bag.count(topic) for topic in bag.topics}
 

@@ -250,6 +250,33 @@ def test_images_of_another_size_than_their_camera_info_give_no_heatmap(bench, pi
     assert not heatmaps
 
 
+def test_frames_are_not_used_after_their_camera_info_has_stopped(bench, picture, monkeypatch):
+    monkeypatch.setattr('peace_ros.core.camera_infos.SILENT_S', 0.5)
+    heatmaps = bench.heard(Image, 'heatmap', qos.IMAGE_IN)
+    found, of_camera = bench.findings('heatmaps'), bench.findings('camera_info')
+    bench.run(SegmentationNode, Painter(), template='DD')
+    images = bench.offer(Image, 'image', qos.IMAGE_OUT)
+    bench.until(lambda: bool(of_camera))
+    assert of_camera[-1].message.startswith('none: camera_width')
+    infos = bench.offer(CameraInfo, 'camera_info', qos.RESULT)
+    stamps = iter(range(1, 1000))
+
+    def see(*, told: bool):
+        at_ns = next(stamps)
+        if told:
+            infos.publish(camera_info((64, 48), BENT, at_ns, 'optical'))
+        images.publish(picture(at_ns))
+
+    bench.until(lambda: bool(heatmaps), lambda: see(told=True))
+    bench.until(
+        lambda: bool(found) and found[-1].message.startswith('no camera_info on /camera_info for'),
+        lambda: see(told=False),
+    )
+    heatmaps.clear()
+    bench.until(lambda: bool(heatmaps), lambda: see(told=True))
+    bench.until(lambda: of_camera[-1].message.startswith('no camera_info on /camera_info for'))
+
+
 def test_the_compressed_images_are_beside_the_remapped_image(bench):
     remap = ['--ros-args', '-r', 'image:=/belly/image_raw']
     node = SegmentationNode(

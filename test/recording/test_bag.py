@@ -4,8 +4,11 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import struct
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -307,7 +310,7 @@ def test_messages_may_be_compressed_one_by_one(tmp_path) -> None:
 @pytest.mark.parametrize(
     ('text', 'says'),
     [
-        ('a: [', 'does not tell the files'),
+        ('a: [', 'not usable YAML'),
         ('a: 1', 'does not tell the files'),
         ('rosbag2_bagfile_information: {relative_file_paths: []}', 'names no files'),
         ('rosbag2_bagfile_information: {relative_file_paths: [x.db3]}', 'names x.db3, which'),
@@ -402,3 +405,16 @@ def test_images_that_cannot_be_used_say_why() -> None:
 def test_a_pose_that_is_not_one_is_refused(position, turn) -> None:
     with pytest.raises(VehicleError, match='finite'):
         pose_from_message(pose_stamped(1, position, turn))
+
+
+def test_a_pipe_named_as_a_bag_is_not_waited_for(tmp_path) -> None:
+    os.mkfifo(tmp_path / 'a.mcap')
+    with pytest.raises(RecordingError, match='is a device or a pipe'):
+        BagReader(tmp_path / 'a.mcap')
+
+
+def test_a_file_that_unpacks_to_more_than_the_disk_has_is_refused(tmp_path, monkeypatch) -> None:
+    (tmp_path / 'a.mcap.zstd').write_bytes(zstandard.ZstdCompressor().compress(bytes(3_000_000)))
+    monkeypatch.setattr(shutil, 'disk_usage', lambda _: SimpleNamespace(free=4_000_000))
+    with pytest.raises(RecordingError, match='larger than 1 MiB when unpacked'):
+        BagReader(tmp_path / 'a.mcap.zstd').__enter__()

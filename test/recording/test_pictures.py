@@ -147,6 +147,7 @@ def test_pictures_are_saved_whole_or_not_at_all(tmp_path) -> None:
     save_picture(picture, tmp_path / 'a.png')
     assert [each.name for each in tmp_path.iterdir()] == ['a.png']
     np.testing.assert_array_equal(cv2.imread(str(tmp_path / 'a.png'))[:, :, ::-1], picture)
+    (tmp_path / 'no').write_text('a file where the folder should be')
     with pytest.raises(RecordingError, match='cannot be written'):
         save_picture(picture, tmp_path / 'no' / 'a.png')
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from peace_ros.core.domain import ConfigurationError
-from peace_ros.recording.run_folder import create_run_folder
+from peace_ros.core.domain import ConfigurationError, RecordingError
+from peace_ros.recording.run_folder import create_run_folder, write_whole
 
 
 def test_a_chosen_folder_may_be_new_or_empty(tmp_path) -> None:
@@ -37,3 +37,17 @@ def test_a_place_without_room_for_runs_is_refused(tmp_path, monkeypatch) -> None
     Path('runs').write_text('no folder')
     with pytest.raises(ConfigurationError, match=r'runs/name cannot be used'):
         create_run_folder(None, 'name', '--out')
+
+
+def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch) -> None:
+    write_whole(tmp_path / 'new' / 'a.json', 'old', 'figures')
+
+    def full(path: Path, _content: bytes) -> None:
+        path.touch()
+        raise OSError(28, 'No space left on device')
+
+    monkeypatch.setattr(Path, 'write_bytes', full)
+    with pytest.raises(RecordingError, match=r'figures .*a\.json cannot be written .*No space'):
+        write_whole(tmp_path / 'new' / 'a.json', 'new', 'figures')
+    assert (tmp_path / 'new' / 'a.json').read_text() == 'old'
+    assert [each.name for each in (tmp_path / 'new').iterdir()] == ['a.json']

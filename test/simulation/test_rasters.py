@@ -18,8 +18,8 @@ from rasterio.transform import Affine, from_origin
 
 from peace_ros.core.domain import Label
 from peace_ros.simulation import load_world
+from peace_ros.simulation.picture_files import RasterError
 from peace_ros.simulation.rasters import (
-    RasterError,
     _tell_scaling,
     read_gsd_m,
     read_indices,

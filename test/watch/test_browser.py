@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,15 @@ def test_axe_finds_no_barrier_in_old_news(served, scenes, visit):
     assert_no_barrier(seen.page)
 
 
+def hover(mark: Any) -> None:
+    """Point at a mark, which may just be drawn anew."""
+    for _ in range(20):
+        with suppress(playwright.Error):
+            mark.hover(force=True, timeout=1000)
+            return
+    raise AssertionError(f'nothing to point at: {mark}')
+
+
 def assert_no_barrier(page: Any) -> None:
     found = axe.Axe().run(page)
     assert found.violations_count == 0, found.generate_report()
@@ -132,7 +142,7 @@ def test_a_refused_place_gives_its_reason_under_the_pointer_and_by_the_keyboard(
     seen = visit()
     mark = seen.page.locator('#map [data-kind="refused 2"]')
     mark.wait_for()
-    mark.hover(force=True)
+    hover(mark)
     seen.shows('map-caption', 'something clearly unsafe was seen there 3 s ago')
     seen.page.locator('#camera-marks [data-kind="refused 1"]').focus()
     seen.shows('camera-caption', 'too narrow by 1.2 m')

@@ -14,7 +14,14 @@ from peace_ros.core.domain.errors import (
 )
 from peace_ros.core.domain.health import Health, Level
 from peace_ros.core.domain.labels import SAFE_LABELS, Label, is_safe
-from peace_ros.core.domain.motion import HeightReport, Pose, Setpoint, Site, Telemetry
+from peace_ros.core.domain.motion import (
+    GimbalReport,
+    HeightReport,
+    Pose,
+    Setpoint,
+    Site,
+    Telemetry,
+)
 from peace_ros.core.domain.odometry import InertialSample, MotionEstimate
 from peace_ros.core.domain.perception import DepthImage, Frame, Heatmap, Prompt, RankedWord
 
@@ -27,6 +34,7 @@ __all__ = [
     'DepthImage',
     'Distortion',
     'Frame',
+    'GimbalReport',
     'Health',
     'Heatmap',
     'HeightReport',

@@ -168,6 +168,28 @@ def camera_pose(mount: Mount, pose: Pose) -> Pose:
     )
 
 
+def camera_pose_on_gimbal(mount: Mount, pose: Pose, gimbal: Quaternion, *, in_earth: bool) -> Pose:
+    """Return where a camera on a gimbal is and how it is turned, as :func:`camera_pose` does.
+
+    Args:
+        mount: where the gimbal is on the vehicle, and how the camera is turned on it; by default it
+            looks forward of the gimbal, with the top of its picture up.
+        pose: of the vehicle.
+        gimbal: attitude of the gimbal (forward, right, down), see GimbalReport.
+        in_earth: it is in NED, otherwise from the heading of the vehicle.
+    """
+    place = camera_pose(Mount(offset_frd_m=mount.offset_frd_m), pose)
+    if not in_earth:
+        heading_rad = yaw_from_quaternion(pose.quaternion_ned_frd)
+        gimbal = multiply(quaternion_from_euler(0.0, 0.0, heading_rad), gimbal)
+    turned = multiply(multiply(gimbal, _NADIR_TO_FORWARD), mount.quaternion)
+    return replace(place, quaternion_ned_frd=turned)
+
+
+_NADIR_TO_FORWARD: Quaternion = (_SQRT_HALF, 0.0, _SQRT_HALF, 0.0)
+"""A quarter turn up about the right axis: a camera that looked down looks forward."""
+
+
 def ground_to_camera(camera: Camera, pose: Pose) -> NDArray[np.float64]:
     """Return the 3 x 3 matrix from level ground (north m, east m, 1) to the axes of the picture.
 
@@ -220,6 +242,17 @@ def mount_from_optical(rotation_flu: Quaternion, offset_flu_m: tuple[float, floa
     frd_from_optical = multiply(_FRD_TO_FLU, rotation_flu)
     x, y, z = offset_flu_m
     return Mount(_positive_w(multiply(frd_from_optical, _BODY_TO_OPTICAL)), (x, -y, -z))
+
+
+def optical_from_mount(mount: Mount) -> tuple[Quaternion, tuple[float, float, float]]:
+    """Return rotation and translation (m) of base_link to the optical frame of a mounted camera.
+
+    The inverse of :func:`mount_from_optical`.
+    """
+    optical_from_body = (_SQRT_HALF, 0.0, 0.0, _SQRT_HALF)
+    turned = multiply(_FRD_TO_FLU, multiply(mount.quaternion, optical_from_body))
+    x, y, z = mount.offset_frd_m
+    return _positive_w(turned), (x, -y, -z)
 
 
 _BODY_TO_OPTICAL: Quaternion = (_SQRT_HALF, 0.0, 0.0, -_SQRT_HALF)

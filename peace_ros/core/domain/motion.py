@@ -60,6 +60,19 @@ class HeightReport:
 
 
 @dataclass(frozen=True)
+class GimbalReport:
+    """How a gimbal is turned; its axes are forward (the view of its camera), right and down."""
+
+    stamp_ns: int
+    quaternion: tuple[float, float, float, float]
+    """Unit quaternion w, x, y, z; straight ahead and level is (1, 0, 0, 0)."""
+    in_earth: bool
+    """Turned from NED; otherwise from level axes that are turned to the heading of the vehicle."""
+    problem: str = ''
+    """Why it must not be used; empty when it may."""
+
+
+@dataclass(frozen=True)
 class Telemetry:
     """What the autopilot last said; a field it has not said yet is None."""
 
@@ -81,6 +94,8 @@ class Telemetry:
     """Part of the battery that is left, 0 to 1; None where the autopilot does not say."""
     heights: tuple[HeightReport, ...] = ()
     """Fresh heights by other sources than that of the pose."""
+    gimbal: GimbalReport | None = None
+    """The newest of the gimbal that is followed, None while none is fresh."""
     position_problem: str = ''
     """Why what it said of its position is not believed; empty while it is, and before it said
     anything."""

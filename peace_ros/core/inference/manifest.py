@@ -150,7 +150,7 @@ def parse_manifest(raw: bytes, where: str) -> Manifest:
     """Read a manifest; ``where`` names it in messages. Raises BundleError."""
     try:
         values = json.loads(raw)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise BundleError(f'{where}: not JSON ({error}); build the bundle again') from error
     if not isinstance(values, dict):
         raise BundleError(f'{where}: holds {type(values).__name__}; it must be a JSON object')

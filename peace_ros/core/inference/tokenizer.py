@@ -89,8 +89,14 @@ class Tokenizer:
         if self._unknown_id is None or self._cleans:
             return ()
         encoding = self._tokenizer.encode(text)
-        spans = zip(encoding.ids, encoding.offsets, strict=True)
+        spans = list(zip(encoding.ids, encoding.offsets, strict=True))
         found = [text[start:end] for token, (start, end) in spans if token == self._unknown_id]
+        # A script that the model does not know at all leaves no token.
+        found += [
+            word[0]
+            for word in re.finditer(r'\w+', text)
+            if not any(start < word.end() and word.start() < end for _, (start, end) in spans)
+        ]
         return tuple(dict.fromkeys(found))
 
 

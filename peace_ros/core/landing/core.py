@@ -23,8 +23,9 @@ from peace_ros.core.domain import (
     Telemetry,
 )
 from peace_ros.core.landing.decision import Decision
+from peace_ros.core.landing.engagement import engagement_problem
 from peace_ros.core.landing.guidance import over_site
-from peace_ros.core.landing.heights import HeightWatch
+from peace_ros.core.landing.heights import NO_OTHER_HEIGHT, HeightWatch
 from peace_ros.core.landing.helm import Helm
 from peace_ros.core.landing.intake import HeatmapIntake
 from peace_ros.core.landing.lookout import Lookout
@@ -53,7 +54,9 @@ class LandingCore:
         parameters: LandingParameters,
         camera: Camera,
         map_parameters: MapParameters | None = None,
-        mount: Mount | None = NADIR,
+        mount: Mount = NADIR,
+        *,
+        on_gimbal: bool = False,
     ) -> None:
         """Begin in IDLE.
 
@@ -61,13 +64,17 @@ class LandingCore:
             parameters: Of the landing.
             camera: For frames that come without a calibration of their own.
             map_parameters: Of the map.
-            mount: How the camera sits on the vehicle; None until :meth:`place_camera` says it.
+            mount: How the camera sits on the vehicle.
+            on_gimbal: The camera sits on a gimbal, which telemetry reports, and on it as ``mount``.
         """
         self.parameters = parameters
         self.safety_map = SafetyMap(map_parameters)
-        self._intake = HeatmapIntake(parameters, camera, self.safety_map, mount)
+        self._intake = HeatmapIntake(
+            parameters, camera, self.safety_map, mount, on_gimbal=on_gimbal
+        )
         self._lookout = Lookout(parameters, self.safety_map)
         self._heights = HeightWatch(parameters)
+        self._height_sight = NO_OTHER_HEIGHT
         self._helm = Helm(parameters)
         self._last_ns: int | None = None
         self._drops = 0
@@ -93,17 +100,23 @@ class LandingCore:
         return self._lookout.memory.seen
 
     @property
+    def search_path(self) -> tuple[tuple[float, float], ...]:
+        """Way-points (north, east) of the search while a site is looked for, else none."""
+        return self._helm.search_path
+
+    @property
     def last_rejection(self) -> str:
         """Why the newest heatmap did not reach the map, or why the map was dropped."""
         return self._intake.last_rejection
 
-    def place_camera(self, mount: Mount) -> None:
-        """Set how the camera sits on the vehicle; no heatmap is used before that is known."""
-        self._intake.place_camera(mount)
+    def add_pose(self, pose: Pose, mount: Mount | None = None) -> None:
+        """Keep a pose for the heatmaps around its stamp; in the order of stamps.
 
-    def add_pose(self, pose: Pose) -> None:
-        """Keep a pose for the heatmaps around its stamp; in the order of stamps."""
-        self._intake.add_pose(pose)
+        Args:
+            pose: Of the vehicle.
+            mount: Of the camera at that moment, where it moves.
+        """
+        self._intake.add_pose(pose, mount)
 
     def add_heatmap(self, heatmap: Heatmap) -> None:
         """Put a heatmap into the map with the pose at its stamp, or count the reason why not."""
@@ -112,6 +125,10 @@ class LandingCore:
     def reject_heatmap(self, reason: str) -> None:
         """Count a heatmap that cannot be used, and remember why."""
         self._intake.reject(reason)
+
+    def distrust(self, reason: str) -> None:
+        """Hold, drop the map and use no input while there is a reason; empty: use them again."""
+        self._intake.distrust(reason)
 
     def add_depth(self, depth: DepthImage) -> None:
         """Close ground that a depth image shows not flat; optional, and it opens nothing."""
@@ -128,6 +145,19 @@ class LandingCore:
         self._intake.picture_height.begin()
         self._helm.engage()
 
+    def engagement_problem(
+        self, now_ns: int, telemetry: Telemetry | None, telemetry_age_s: float
+    ) -> str:
+        """Return why a landing cannot begin now, empty when it can; as for :meth:`step`."""
+        return self._intake.distrusted or engagement_problem(
+            self.state,
+            telemetry,
+            telemetry_age_s,
+            self.map_age_s(now_ns),
+            self.parameters,
+            self.last_rejection,
+        )
+
     def disengage(self) -> None:
         """Stop: zero velocity and IDLE from the next step on."""
         self._helm.disengage()
@@ -141,20 +171,30 @@ class LandingCore:
             telemetry_age_s: Since it was received, by a steady clock.
         """
         self._keep_time(now_ns)
+        self._intake.follow_gimbal(None if telemetry is None else telemetry.gimbal)
         self._intake.tick(now_ns)
         if self._intake.drops != self._drops:
             self._drops = self._intake.drops
             self._lookout.forget_choice()
         pose, before = valid_pose(telemetry, self.parameters), self._helm.state
-        sighting = self._lookout.look(now_ns, pose, before, self._helm.without_site_s)
-        heights = self._heights.see(
+        # The heights need to know whether a site is below: those of the step before are used.
+        sighting = self._lookout.look(
+            now_ns, pose, before, self._helm.without_site_s, self._height_sight.above_lowest_m
+        )
+        self._height_sight = heights = self._heights.see(
             now_ns,
             pose,
             self._height_reports(now_ns, telemetry, pose),
             over_site=self._is_over_site(pose, sighting),
         )
         decision = self._helm.decide(
-            now_ns, telemetry, telemetry_age_s, sighting, self._intake.last_rejection, heights
+            now_ns,
+            telemetry,
+            telemetry_age_s,
+            sighting,
+            self._intake.last_rejection,
+            heights,
+            self._intake.distrusted,
         )
         if decision.state is not before and self._lookout.follow(before, decision.state, now_ns):
             self._helm.fail_attempt()

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import hypot
 
 from peace_ros.core.domain import Pose, Setpoint, Site
@@ -98,12 +98,12 @@ def _down(
 
 
 def _lateral_to_site(
-    pose: Pose, site: Site | None, parameters: LandingParameters, gain: float
+    pose: Pose, situation: Situation, parameters: LandingParameters, gain: float
 ) -> tuple[float, float]:
-    limit_m_s = parameters.lateral_speed_limit
+    limit_m_s, site = parameters.lateral_speed_limit, situation.site
     if site is None:
         return 0.0, 0.0
-    if not at_safe_altitude(pose, parameters):
+    if not at_safe_altitude(pose, parameters, situation.above_lowest_m):
         if site.distance_m(pose) > site.clearance_m:
             return 0.0, 0.0
         limit_m_s = min(limit_m_s, parameters.landing_lateral_speed_limit)
@@ -112,7 +112,7 @@ def _lateral_to_site(
 
 def _aim(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wish:
     p, site = parameters, situation.site
-    north, east = _lateral_to_site(pose, site, p, p.gain * p.aiming_gain_mult)
+    north, east = _lateral_to_site(pose, situation, p, p.gain * p.aiming_gain_mult)
     tolerance_m = 0.0 if site is None else site.clearance_m - p.safety_radius_m
     floor_m = p.aiming_floor * p.safe_altitude_m
     down, note = _down(pose, situation, p, floor_m=floor_m, tolerance_m=tolerance_m, share=0.5)
@@ -121,7 +121,7 @@ def _aim(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wi
 
 def _land(pose: Pose, situation: Situation, parameters: LandingParameters) -> _Wish:
     p, site = parameters, situation.site
-    north, east = _lateral_to_site(pose, site, p, p.gain)
+    north, east = _lateral_to_site(pose, situation, p, p.gain)
     room_m = 0.0 if site is None else site.clearance_m - p.safety_radius_m
     tolerance_m = min(max(0.5, 0.5 * room_m), room_m)
     floor_m = p.handover_altitude_m
@@ -139,7 +139,8 @@ def _search(pose: Pose, situation: Situation, parameters: LandingParameters) -> 
     All of it where lateral motion meets no obstacle.
     """
     p = parameters
-    if not at_safe_altitude(pose, p) or situation.site is not None:
+    safe = at_safe_altitude(pose, p, situation.above_lowest_m)
+    if not safe or situation.site is not None:
         return _STAND, 'looking'
     begun_m = (situation.home or pose).altitude_agl_m
     down = _to_altitude(pose, situation, min(begun_m, _HIGHEST_SEARCH_M), p)
@@ -172,7 +173,7 @@ def _return(pose: Pose, situation: Situation, parameters: LandingParameters) -> 
     p, home = parameters, situation.home
     if home is None:
         return _STAND, 'where the landing began is not known'
-    if not at_safe_altitude(pose, p):
+    if not at_safe_altitude(pose, p, situation.above_lowest_m):
         return _climb(pose, situation, p)
     north, east = _towards(pose, home.north_m, home.east_m, p.gain, p.search_speed)
     return (north, east, 0.0), ''
@@ -196,30 +197,30 @@ class ExpandingSquare:
     _TURNS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 
     def __init__(self, home: tuple[float, float], spacing_m: float, radius_m: float) -> None:
-        self._home = home
-        self._spacing_m = spacing_m
-        self._radius_m = radius_m
-        self._begin()
-
-    def _begin(self) -> None:
-        self._leg = 0
-        self._north, self._east = self._home
+        self.way = tuple(self._way_points(home, spacing_m, radius_m))
+        """Home and the way-points of one round (north, east), all within the radius of home."""
+        self._next = 0
         self.advance()
+
+    def _way_points(
+        self, home: tuple[float, float], spacing_m: float, radius_m: float
+    ) -> Iterator[tuple[float, float]]:
+        (north, east), leg = home, 0
+        while hypot(north - home[0], east - home[1]) <= radius_m:
+            yield north, east
+            turn_north, turn_east = self._TURNS[leg % 4]
+            north += turn_north * (leg // 2 + 1) * spacing_m
+            east += turn_east * (leg // 2 + 1) * spacing_m
+            leg += 1
 
     def advance(self) -> None:
         """Go on to the next way-point: this one is reached, or cannot be."""
-        turn_north, turn_east = self._TURNS[self._leg % 4]
-        length = (self._leg // 2 + 1) * self._spacing_m
-        self._north += turn_north * length
-        self._east += turn_east * length
-        self._leg += 1
+        rounds = max(1, len(self.way) - 1)
+        self._next = min(self._next % rounds + 1, len(self.way) - 1)
 
     def target(self, pose: Pose) -> tuple[float, float]:
-        """Return the way-point to fly to from here (north, east), within the radius of home."""
-        if hypot(self._north - pose.north_m, self._east - pose.east_m) <= self._ARRIVED_M:
+        """Return the way-point to fly to from here (north, east)."""
+        north, east = self.way[self._next]
+        if hypot(north - pose.north_m, east - pose.east_m) <= self._ARRIVED_M:
             self.advance()
-        if hypot(self._north - self._home[0], self._east - self._home[1]) > self._radius_m:
-            self._begin()
-            if self._spacing_m > self._radius_m:
-                return self._home
-        return self._north, self._east
+        return self.way[self._next]

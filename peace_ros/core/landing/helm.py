@@ -89,6 +89,11 @@ class Helm:
         self._budget.fail_attempt(self._reason)
 
     @property
+    def search_path(self) -> tuple[tuple[float, float], ...]:
+        """Way-points (north, east) of the search while a site is looked for, else none."""
+        return self._square.way if self._square is not None and self.state in LOOKING else ()
+
+    @property
     def attempts(self) -> int:
         """Descents that failed in this engagement."""
         return self._budget.attempts
@@ -106,6 +111,7 @@ class Helm:
         sighting: Sighting,
         last_rejection: str = '',
         heights: HeightSight = NO_OTHER_HEIGHT,
+        distrusted: str = '',
     ) -> Decision:
         """Decide what to do now.
 
@@ -116,12 +122,13 @@ class Helm:
             sighting: What the map says.
             last_rejection: Why the newest heatmap was not used, for the sentence.
             heights: What other sources say of the altitude.
+            distrusted: Why inputs cannot be used, whatever they say; empty when they can.
         """
         p = self._p
         if self._since_ns is None:
             self._since_ns = now_ns
         pose = valid_pose(telemetry, p)
-        bad_data = bad_telemetry(telemetry, telemetry_age_s, p)
+        bad_data = distrusted or bad_telemetry(telemetry, telemetry_age_s, p)
         bad_data = bad_data or bad_map(sighting.map_age_s, last_rejection, p) or heights.problem
         site = None if bad_data else sighting.reachable
         if self._engaged:
@@ -141,7 +148,7 @@ class Helm:
         # What a fence takes from the speed is no drift.
         fenced = telemetry is not None and telemetry.fence != ''
         self._drift.see(None if fenced else pose, self._told)
-        wish = self._drift.made_up(wish, self._lateral_limit_m_s(pose))
+        wish = self._drift.made_up(wish, self._lateral_limit_m_s(situation))
         setpoint, guard_notes = self._guard.limit(wish, situation)
         self._told = setpoint
         relaxed = sighting.threshold < p.safety_threshold
@@ -161,8 +168,8 @@ class Helm:
             heights_m=heights.heights_m,
         )
 
-    def _lateral_limit_m_s(self, pose: Pose | None) -> float:
-        high = at_safe_altitude(pose, self._p)
+    def _lateral_limit_m_s(self, situation: Situation) -> float:
+        high = at_safe_altitude(situation.pose, self._p, situation.above_lowest_m)
         return self._p.lateral_speed_limit if high else self._p.landing_lateral_speed_limit
 
     def _time_in_state_s(self, now_ns: int) -> float:
@@ -208,7 +215,7 @@ class Helm:
             looked_long=seen >= p.giveup_looks,
             over_site=over and situation.sighting.ground_is_fresh,
             centred=error_m <= p.handover_error_m,
-            at_safe_altitude=at_safe_altitude(pose, p),
+            at_safe_altitude=at_safe_altitude(pose, p, situation.above_lowest_m),
             low_enough_to_land=lowest_m <= p.aiming_floor * p.safe_altitude_m + _AIMED_M,
             at_handover_altitude=lowest_m <= p.handover_altitude_m + p.handover_tolerance_m
             and may_hand_over,

@@ -12,9 +12,20 @@ from collections import Counter, deque
 
 import numpy as np
 
-from peace_ros.core.domain import NADIR, Camera, DepthImage, Frame, Heatmap, ImageError, Mount, Pose
+from peace_ros.core.domain import (
+    NADIR,
+    Camera,
+    DepthImage,
+    Frame,
+    GimbalReport,
+    Heatmap,
+    ImageError,
+    Mount,
+    Pose,
+)
 from peace_ros.core.domain.geometry import camera_pose
 from peace_ros.core.landing.calibration import Calibration, has_shape
+from peace_ros.core.landing.gimbal import GimbalMount
 from peace_ros.core.landing.odometry import PositionCarrier
 from peace_ros.core.landing.parameters import LandingParameters
 from peace_ros.core.landing.picture_height import PictureHeight
@@ -25,7 +36,6 @@ from peace_ros.core.mapping import RefusedLookError, SafetyMap
 _PENDING_LIMIT = 4
 _REASONS = 64
 """So many are counted apart."""
-_NO_MOUNT = 'how the camera is mounted is not known yet'
 
 
 class HeatmapIntake:
@@ -39,12 +49,15 @@ class HeatmapIntake:
         parameters: LandingParameters,
         camera: Camera,
         safety_map: SafetyMap,
-        mount: Mount | None = NADIR,
+        mount: Mount = NADIR,
+        *,
+        on_gimbal: bool = False,
     ) -> None:
         self._p = parameters
         self._calibration = Calibration(camera)
         self._camera = camera
         self._mount = mount
+        self._gimbal = GimbalMount(mount, parameters.pose_gap_limit_s) if on_gimbal else None
         self._map = safety_map
         self._poses = PoseHistory(parameters.pose_gap_limit_s)
         self._carrier = PositionCarrier(camera, parameters.pose_gap_limit_s, safety_map)
@@ -58,8 +71,14 @@ class HeatmapIntake:
         self.counts: Counter[str] = Counter()
         """Heatmaps by result: `used`, or the reason of a rejection."""
         self._last_rejection = self._drop_reason = ''
+        self._distrusted = ''
         self.drops = 0
         """How often the map was dropped; a site chosen from it is no longer valid then."""
+
+    @property
+    def distrusted(self) -> str:
+        """Why nothing that comes is used now, empty when it is."""
+        return self._distrusted or ('' if self._gimbal is None else self._gimbal.problem)
 
     @property
     def picture_height(self) -> PictureHeight:
@@ -79,20 +98,33 @@ class HeatmapIntake:
         self._depths.clear()
         self._newest_depth_ns = -1
         self._clock_ns = None
+        if self._gimbal is not None:
+            self._gimbal.clear()
 
-    def place_camera(self, mount: Mount) -> None:
-        """Set how the camera is mounted; what was seen with another mount is dropped."""
-        if mount != self._mount:
-            self._mount = mount
-            self._poses.clear()
-            self._carrier.clear()
-            self._drop_map('the camera is mounted otherwise')
+    def distrust(self, reason: str) -> None:
+        """Drop the map and use nothing that comes while there is a reason; empty: use it again."""
+        self._distrusted = reason
+        if reason:
+            self.clear()
+            self._drop_map(reason)
 
-    def add_pose(self, pose: Pose) -> None:
+    def add_pose(self, pose: Pose, mount: Mount | None = None) -> None:
         """Keep a pose, north and east NaN where unknown, and use the heatmaps that wait for it."""
-        if self._mount is None:
+        if self.distrusted:
             return
-        pose = camera_pose(self._mount, pose)
+        if self._gimbal is None:
+            self._add_camera_pose(camera_pose(mount or self._mount, pose))
+        else:
+            self._gimbal.add_pose(pose)
+
+    def follow_gimbal(self, report: GimbalReport | None) -> None:
+        """Turn a camera on a gimbal as its newest report says; None when none is fresh."""
+        if self._gimbal is not None:
+            self._gimbal.see(report)
+            for pose in self._gimbal.take_placed():
+                self._add_camera_pose(pose)
+
+    def _add_camera_pose(self, pose: Pose) -> None:
         if not pose.has_position:
             kept = self._carrier.add_pose(pose)
         else:
@@ -134,8 +166,8 @@ class HeatmapIntake:
     def add_heatmap(self, heatmap: Heatmap) -> None:
         """Use a heatmap, let it wait for its pose, or reject it."""
         newest_ns = self._pending[-1].stamp_ns if self._pending else self._map.stamp_ns
-        if self._mount is None:
-            self.reject(_NO_MOUNT)
+        if self.distrusted:
+            self.reject(self.distrusted)
         elif not np.isfinite(heatmap.safety).all():
             self.reject('not finite')
         elif newest_ns is not None and heatmap.stamp_ns <= newest_ns:

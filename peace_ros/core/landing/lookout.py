@@ -59,7 +59,14 @@ class Lookout:
         """The best places around the vehicle that are no sites, as of the last second."""
         self._explained_ns: int | None = None
 
-    def look(self, now_ns: int, pose: Pose | None, state: State, without_site_s: float) -> Sighting:
+    def look(
+        self,
+        now_ns: int,
+        pose: Pose | None,
+        state: State,
+        without_site_s: float,
+        above_lowest_m: float = 0.0,
+    ) -> Sighting:
         """Return what is known now.
 
         Args:
@@ -67,18 +74,20 @@ class Lookout:
             pose: Of the vehicle; None while it is not known, and then nothing is judged anew.
             state: Of the landing; it decides where to look, and how strictly.
             without_site_s: How long a site has been searched without success.
+            above_lowest_m: Altitude of the pose minus the lowest height that is believed.
         """
         self.memory.forgive(now_ns)
         score, age_s = 0.0, inf
         if pose is not None:
-            self._judge(now_ns, pose, state, without_site_s)
+            low = state is State.LANDING or not at_safe_altitude(pose, self._p, above_lowest_m)
+            self._judge(now_ns, pose, state, without_site_s, low=low)
             score, age_s = self._map.score_around(
                 pose.north_m, pose.east_m, self._p.safety_radius_m, now_ns
             )
         stamp_ns = self._map.stamp_ns
         return Sighting(
             verdict=self._verdict,
-            reachable=self.reachable(pose),
+            reachable=self.reachable(pose, above_lowest_m),
             ground_is_fresh=self._ground_is_fresh and pose is not None,
             ground_score=score,
             ground_age_s=age_s,
@@ -112,14 +121,16 @@ class Lookout:
         self._anchor = self._aimed_at = None
         return descended
 
-    def reachable(self, pose: Pose | None) -> Site | None:
+    def reachable(self, pose: Pose | None, above_lowest_m: float = 0.0) -> Site | None:
         """Return the site of the verdict, None when lateral motion to it may meet an obstacle."""
         site = self._verdict.site
-        if site is None or pose is None or at_safe_altitude(pose, self._p):
+        if site is None or pose is None or at_safe_altitude(pose, self._p, above_lowest_m):
             return site
         return site if site.distance_m(pose) <= site.clearance_m else None
 
-    def _judge(self, now_ns: int, pose: Pose, state: State, without_site_s: float) -> None:
+    def _judge(
+        self, now_ns: int, pose: Pose, state: State, without_site_s: float, *, low: bool
+    ) -> None:
         """Renew verdict, focus and threshold when the map has changed or aged."""
         revision, judged_ns = self._judged
         is_new = revision != self._map.revision
@@ -128,7 +139,6 @@ class Lookout:
         self._judged = (self._map.revision, now_ns)
         focus = self._moved_focus(pose, state, is_new=is_new)
         self._focus = focus
-        low = state is State.LANDING or not at_safe_altitude(pose, self._p)
         age_limit_s = self._p.landing_site_age_limit_s if low else self._p.site_age_limit_s
         reach_m = focus.radius_m + 1.2 * self._p.ample_clearance_m
         layers = self._map.layers(now_ns, (focus.north_m, focus.east_m, reach_m))

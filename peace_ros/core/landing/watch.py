@@ -24,11 +24,13 @@ def valid_pose(telemetry: Telemetry | None, parameters: LandingParameters) -> Po
     return pose if 0.0 < pose.altitude_agl_m <= parameters.altitude_limit_m else None
 
 
-def at_safe_altitude(pose: Pose | None, parameters: LandingParameters) -> bool:
-    """Return whether lateral motion meets no obstacle at this altitude."""
+def at_safe_altitude(
+    pose: Pose | None, parameters: LandingParameters, above_lowest_m: float = 0.0
+) -> bool:
+    """Return whether lateral motion meets no obstacle ``above_lowest_m`` below the pose."""
     if pose is None:
         return False
-    return pose.altitude_agl_m >= _AT_ALTITUDE * parameters.safe_altitude_m
+    return pose.altitude_agl_m - above_lowest_m >= _AT_ALTITUDE * parameters.safe_altitude_m
 
 
 class ControlWatch:

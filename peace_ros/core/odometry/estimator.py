@@ -56,7 +56,7 @@ from peace_ros.core.odometry.plane import (
     Solution,
     solve,
 )
-from peace_ros.core.odometry.velocity import Track, Velocity
+from peace_ros.core.odometry.velocity import PositionTrack, Velocity
 
 VIEW_PX = 352
 """Longer edge of the pictures that are compared."""
@@ -190,7 +190,7 @@ class VisualInertialOdometry:
         self._camera = camera
         self._mount = mount
         self._inertial = InertialHistory()
-        self._track = Track(self._p.velocity_window_s)
+        self._track = PositionTrack(self._p.velocity_window_s)
         self._state: _VehicleState | None = None
         self._key: _Key | None = None
         self._last: NDArray[np.uint8] | None = None

@@ -28,7 +28,7 @@ class Velocity:
     """(3,)."""
 
 
-class Track:
+class PositionTrack:
     """Positions of the last moments, against one key frame or several that join."""
 
     def __init__(self, window_s: float) -> None:

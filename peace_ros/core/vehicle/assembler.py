@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from math import nan, sqrt
+from math import hypot, nan
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -17,6 +17,8 @@ from peace_ros.core.domain.motion import HeightReport, Pose, Telemetry
 from peace_ros.core.vehicle.boots import BootClock, BootMoment
 from peace_ros.core.vehicle.clock import TimeMap
 from peace_ros.core.vehicle.dialects import Dialect
+from peace_ros.core.vehicle.gimbal import MESSAGE as GIMBAL
+from peace_ros.core.vehicle.gimbal import GimbalWatch
 from peace_ros.core.vehicle.gnss import GnssWatch
 from peace_ros.core.vehicle.heights import (
     MAX_EXTRAPOLATION_S,
@@ -41,7 +43,7 @@ GLOBAL_POSITION = mavlink.ESTIMATOR_POS_HORIZ_ABS
 GUESSES_POSITION = mavlink.ESTIMATOR_CONST_POS_MODE
 """PX4 sets it for a vehicle at rest too, beside the bit of a global position, which it then has."""
 IN_ORDER = frozenset(
-    {'LOCAL_POSITION_NED', 'ATTITUDE', 'ATTITUDE_QUATERNION', 'GLOBAL_POSITION_INT'}
+    {'LOCAL_POSITION_NED', 'ATTITUDE', 'ATTITUDE_QUATERNION', 'GLOBAL_POSITION_INT', GIMBAL}
 )
 """Of these only the newest is used, in whatever order they are received."""
 FARTHEST_M, HIGHEST_MM, FASTEST_M_S, TURN_RAD = 1e6, 2e7, 100.0, 7.0
@@ -121,12 +123,13 @@ class Assembler:
         self._height: Height | None = None
         self._heights = Pairwise(self._parameters.jump_limit_m)
         self._range: tuple[int, float] | None = None
-        self._ranges = Pairwise(self._parameters.jump_limit_m)
+        self._ranges = Pairwise(self._parameters.jump_limit_m, first=False)
         self._others = OtherHeights(self._parameters.jump_limit_m)
         self._newest_boot_ms: dict[str, int] = {}
         self._estimator: tuple[int, int, int] | None = None
         """Steady clock, flags, flags of the report before."""
         self._gnss = GnssWatch()
+        self._gimbal = GimbalWatch(self._parameters.gimbal_id, self._parameters.pose_limit_s)
         self.stops = Stops()
         self.landed_state = 0
         self.arrived_ns.clear()
@@ -144,7 +147,7 @@ class Assembler:
         self._received_ns = steady_ns
         kind = message.get_type()
         handler = _HANDLERS.get(kind)
-        if handler is None:
+        if handler is None or (kind == GIMBAL and not self._parameters.follow_gimbal):
             return
         absurd = _absurd(kind, message)
         if kind == 'LOCAL_POSITION_NED':
@@ -230,6 +233,7 @@ class Assembler:
             landed=None if state == 0 else state == mavlink.MAV_LANDED_STATE_ON_GROUND,
             status_text=self.texts.newest,
             battery_remaining=self._battery,
+            gimbal=self._gimbal.fresh(steady_ns),
             heights=() if pose is None else self._other_heights(pose, steady_ns),
         )
 
@@ -401,6 +405,9 @@ class Assembler:
     def _take_terrain(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
         self._others.take_terrain(m, steady_ns)
 
+    def _take_gimbal(self, m: Any, stamp_ns: int, steady_ns: int) -> None:
+        self._gimbal.take(m, self._clock.stamp_ns(m.time_boot_ms, stamp_ns), steady_ns)
+
     def _text(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
         self.texts.take(m, steady_ns)
         whole = bool(self.texts.entries) and self.texts.entries[-1][0] == steady_ns
@@ -415,7 +422,7 @@ class Assembler:
 
 
 def _size(m: Any) -> float:
-    return sqrt(m.q1 * m.q1 + m.q2 * m.q2 + m.q3 * m.q3 + m.q4 * m.q4)
+    return hypot(*m.q) if m.get_type() == GIMBAL else hypot(m.q1, m.q2, m.q3, m.q4)
 
 
 def _level_share(q: Quaternion) -> float:
@@ -434,7 +441,7 @@ def _absurd(kind: str, message: Any) -> str:
         value = getattr(message, name)
         if not abs(value) <= limit:  # also NaN
             return f'{kind} has {name} = {value:g}, limit {limit:g}: the message is rejected'
-    if kind == 'ATTITUDE_QUATERNION' and not 0.9 < _size(message) < 1.1:
+    if kind in {'ATTITUDE_QUATERNION', GIMBAL} and not 0.9 < _size(message) < 1.1:
         return f'{kind} of size {_size(message):g}: must be 1'
     return ''
 
@@ -456,6 +463,7 @@ _HANDLERS = {
     'TERRAIN_REPORT': Assembler._take_terrain,  # noqa: SLF001
     'EKF_STATUS_REPORT': Assembler._estimate,  # noqa: SLF001
     'ESTIMATOR_STATUS': Assembler._estimate,  # noqa: SLF001
+    GIMBAL: Assembler._take_gimbal,  # noqa: SLF001
     'STATUSTEXT': Assembler._text,  # noqa: SLF001
     **dict.fromkeys(MESSAGES, Assembler._take_stop),  # noqa: SLF001
     **dict.fromkeys(INERTIAL, Assembler._take_inertial),  # noqa: SLF001

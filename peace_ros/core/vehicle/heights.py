@@ -24,6 +24,8 @@ LEAST_GNSS_ERROR_M, GNSS_ERROR_M = 1.0, 3.0
 TERRAIN_ERROR_M = 5.0
 """Of terrain data, as of SRTM."""
 RANGE_ERROR_M = 0.3
+LEAST_LEVEL_SHARE = 0.5
+"""Tilted farther, 60 degrees, a rangefinder says nothing of the height (a forged ATTITUDE)."""
 
 
 class HomeHeight:
@@ -103,11 +105,13 @@ class OtherHeights:
     """Heights that do not rest on the barometer: GNSS (GPS_RAW_INT), terrain data, rangefinder.
 
     Args:
-        limit_m: One that is farther from the message before it needs a second message.
+        limit_m: The first, and one that is farther from the message before it, need a second one.
     """
 
     def __init__(self, limit_m: float) -> None:
-        self._pairs: defaultdict[str, Pairwise] = defaultdict(lambda: Pairwise(limit_m))
+        self._pairs: defaultdict[str, Pairwise] = defaultdict(
+            lambda: Pairwise(limit_m, first=False)
+        )
         self._newest: dict[str, tuple[int, HeightReport]] = {}
 
     def fresh(self, steady_ns: int, level_share: float) -> tuple[HeightReport, ...]:
@@ -121,6 +125,7 @@ class OtherHeights:
         return tuple(
             replace(each, height_m=each.height_m * level_share) if each.is_narrow else each
             for each in fresh
+            if not each.is_narrow or level_share >= LEAST_LEVEL_SHARE
         )
 
     def take_fix(self, m: Any, steady_ns: int) -> None:
@@ -137,12 +142,12 @@ class OtherHeights:
             self._keep(steady_ns, HeightReport('terrain data', m.current_height, TERRAIN_ERROR_M))
 
     def take_range(self, distance_m: float | None, steady_ns: int) -> None:
-        """Take the distance along body-down, None when out of range."""
+        """Take the distance along body-down, None when out of range; the caller has checked it."""
         if distance_m is None:
             self._newest.pop('rangefinder', None)
             return
         report = HeightReport('rangefinder', distance_m, RANGE_ERROR_M, is_narrow=True)
-        self._keep(steady_ns, report)
+        self._newest['rangefinder'] = (steady_ns, report)
 
     def _keep(self, steady_ns: int, report: HeightReport) -> None:
         if self._pairs[report.source].believes(report.height_m):

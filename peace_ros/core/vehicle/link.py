@@ -68,8 +68,8 @@ class VehicleLink(Protocol):
     def request_hold(self) -> RequestResult:
         """Ask for the autopilot's own hold mode."""
 
-    def request_land(self) -> RequestResult:
-        """Ask for the autopilot's own landing, only while it obeys us."""
+    def request_land(self, wanted: Callable[[], bool] = lambda: True) -> RequestResult:
+        """Ask for the autopilot's own landing, only while it obeys us and it is wanted."""
 
     def request_level_hold(self) -> RequestResult:
         """Ask to be held level without any position; only for a person who asks."""

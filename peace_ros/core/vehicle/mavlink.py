@@ -285,11 +285,11 @@ class MavlinkLink:
         self._send(mavlink.MAVLink_command_long_message(*self._peer.target, command, 0, *mode))
         return True
 
-    def request_land(self) -> RequestResult:
-        """Ask for the autopilot's own landing, only while it obeys us."""
+    def request_land(self, wanted: Callable[[], bool] = lambda: True) -> RequestResult:
+        """Ask for the autopilot's own landing, only while it obeys us and it is wanted."""
         if self.taken_over or not self.telemetry().in_control:
             return RequestResult(Answer.REFUSED, 'somebody else has control')
-        return self.set_mode(self.dialect.land_mode)
+        return self.set_mode(self.dialect.land_mode, wanted)
 
     def request_level_hold(self) -> RequestResult:
         """Ask to be held level, at this height and heading, without any position.
@@ -312,13 +312,24 @@ class MavlinkLink:
         self._holding_level = bool(result)
         return result
 
-    def set_mode(self, mode: str) -> RequestResult:
-        """Ask for a mode by the autopilot's own name and wait until HEARTBEAT shows it."""
+    def set_mode(self, mode: str, wanted: Callable[[], bool] = lambda: True) -> RequestResult:
+        """Ask for a mode by the autopilot's own name and wait until HEARTBEAT shows it.
+
+        It is asked again only while it is wanted and the mode is the one before: a person or a
+        failsafe who changes the mode meanwhile is not overruled.
+        """
+        before = self._heard().mode
         flags, main, sub = self.dialect.mode_command(mode)
         deadline_ns = time.monotonic_ns() + int(self._parameters.request_limit_s * 1e9)
         if mode != self.dialect.control_mode:
             self._control.leave_to(mode, deadline_ns)
-        result = self.command(mavlink.MAV_CMD_DO_SET_MODE, flags, main, sub)
+        result = self._command(
+            mavlink.MAV_CMD_DO_SET_MODE,
+            (flags, main, sub),
+            lambda: wanted() and self._heard().mode == before,
+        )
+        if result.answer is Answer.NO_ANSWER and before != mode == self._heard().mode:
+            result = RequestResult(Answer.ACCEPTED)  # the answer was lost
         if not result:
             self._control.stay()
             return result
@@ -338,9 +349,15 @@ class MavlinkLink:
             command: MAV_CMD.
             params: Up to seven parameters; missing ones are 0.
         """
+        return self._command(command, params)
+
+    def _command(
+        self, command: int, params: tuple[float, ...], wanted: Callable[[], bool] = lambda: True
+    ) -> RequestResult:
         with self._changed:
             texts = self._heard().texts
-        return self._requests.command(self._send, self._peer.target, texts, command, params)
+        target = self._peer.target
+        return self._requests.command(self._send, target, texts, command, params, wanted)
 
     def close(self) -> None:
         """Stop the thread and release the line; may be called twice."""

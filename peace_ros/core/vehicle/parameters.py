@@ -75,6 +75,15 @@ class VehicleParameters(ParameterSet):
         low=1.0,
         high=100.0,
     )
+    follow_gimbal: bool = parameter(
+        False,
+        'The camera is on a gimbal whose attitude the autopilot reports '
+        '(GIMBAL_DEVICE_ATTITUDE_STATUS), and is turned on it as mount_* say: by default it looks '
+        'forward of the gimbal. Without a fresh report the vehicle holds.',
+    )
+    gimbal_id: int = parameter(
+        0, 'With follow_gimbal: its gimbal_device_id; 0 takes the only one.', low=0, high=255
+    )
     after_handover: str = parameter(
         'hold',
         'After HANDOVER: hold position; land (the mode of the autopilot); or landing_target: hold '

@@ -62,15 +62,20 @@ class Requests:
         texts: StatusTexts,
         command: int,
         values: tuple[float, ...],
+        wanted: Callable[[], bool] = lambda: True,
     ) -> RequestResult:
-        """Send COMMAND_LONG until it is acknowledged; VehicleError of ``send`` passes."""
+        """Send COMMAND_LONG until it is acknowledged, while it is wanted; VehicleError passes."""
         started_ns = time.monotonic_ns()
         padded = (*values, *(0.0,) * (7 - len(values)))
 
         def ask(attempt: int) -> None:
             send(mavlink.MAVLink_command_long_message(*target, command, min(attempt, 255), *padded))
 
-        code = self._answer(ask, self._acks, command)
+        code = self._answer(ask, self._acks, command, wanted)
+        if code is None and not wanted():
+            return RequestResult(
+                Answer.NO_ANSWER, 'it was withdrawn, or the mode changed meanwhile'
+            )
         if code is None:
             return RequestResult(Answer.NO_ANSWER, f'no COMMAND_ACK within {self._limit_s} s')
         if code == mavlink.MAV_RESULT_ACCEPTED:
@@ -88,19 +93,24 @@ class Requests:
         return self._answer(ask, self._values, name)
 
     def _answer(
-        self, ask: Callable[[int], None], answers: dict[Any, Any], key: int | str
+        self,
+        ask: Callable[[int], None],
+        answers: dict[Any, Any],
+        key: int | str,
+        wanted: Callable[[], bool] = lambda: True,
     ) -> float | None:
         deadline = time.monotonic() + self._limit_s
         with self._one_at_a_time:
             with self._changed:
                 answers.pop(key, None)
             attempt = 0
-            while (left_s := deadline - time.monotonic()) > 0.0 and not self._ended:
+            while (left_s := deadline - time.monotonic()) > 0.0 and not self._ended and wanted():
                 ask(attempt)
                 attempt += 1
                 with self._changed:
                     self._changed.wait_for(
-                        lambda: key in answers or self._ended, min(RESEND_S, left_s)
+                        lambda: key in answers or self._ended or not wanted(),
+                        min(RESEND_S, left_s),
                     )
                     if key in answers:
                         return float(answers.pop(key))

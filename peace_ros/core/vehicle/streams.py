@@ -68,6 +68,9 @@ class StreamKeeper:
         if parameters.altitude_source == 'rangefinder':
             self.rates_hz[mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR] = parameters.pose_rate_hz
             self._optional.remove(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR)
+        if parameters.follow_gimbal:
+            gimbal = mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
+            self.rates_hz[gimbal] = parameters.pose_rate_hz
         self._wanted_once = [mavlink.MAVLINK_MSG_ID_HOME_POSITION]
         if not dialect.home_is_local:
             self._wanted_once.append(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)

@@ -11,6 +11,8 @@ Vector = tuple[float, float, float]
 SLACK_M_S = 3.0
 """How much the velocity may be wrong or change between two reports."""
 FASTEST_M_S = 20.0
+LED_S = 0.3
+"""Longest way by velocity to a single report: a time stamp ahead of its time leads no farther."""
 GAP_S = 1.0
 """Reports farther apart are compared by the fastest speed only."""
 SETTLED_S = 2.0
@@ -108,7 +110,7 @@ class JumpWatch:
     def _is_near(self, before: PoseReport, after: PoseReport) -> bool:
         """Tell whether place and velocity are as the report before foretold, within the limits."""
         dt_s = (after.boot_ms - before.boot_ms) / 1e3
-        dt_s = dt_s if 0.0 <= dt_s <= GAP_S else 0.0
+        dt_s = min(dt_s, LED_S) if 0.0 <= dt_s <= GAP_S else 0.0
         led_to = [p + dt_s * v for p, v in zip(before.position_m, before.velocity_m_s, strict=True)]
         change_m_s = dist(before.velocity_m_s, after.velocity_m_s)
         return (
@@ -146,13 +148,15 @@ class Pairwise:
 
     Args:
         limit: Difference that is still believed.
+        first: Believe the first number too. Not for what a vehicle may lack: there a forged
+            message is the first, at any time of a flight.
     """
 
-    def __init__(self, limit: float) -> None:
-        self._limit = limit
+    def __init__(self, limit: float, *, first: bool = True) -> None:
+        self._limit, self._first = limit, first
         self._last: float | None = None
 
     def believes(self, value: float) -> bool:
-        """Take a number; the first is believed."""
+        """Take a number; tell whether it may be used."""
         last, self._last = self._last, value
-        return last is None or abs(value - last) <= self._limit
+        return self._first if last is None else abs(value - last) <= self._limit

@@ -14,6 +14,11 @@ from peace_ros.core.vehicle.signing import SIGNED, Signer
 RADIO_STATUS = 109
 """Sent by the radio in between, which has no key; it contains nothing about the vehicle."""
 CHECKSUM_BYTES = 2
+_STARTS = (0xFD, 0xFE)
+"""First byte of a message of MAVLink 2 and 1."""
+_LONGEST_BYTES = 280
+_MOST_SEARCHES = 1000
+"""Per reading: bytes that all look like a start must not take all of the processor."""
 
 
 class Wire:
@@ -30,7 +35,9 @@ class Wire:
         self._signer = signer
         self._datagrams = datagrams
         self._lock = threading.Lock()
-        self._stream_parser = _new_parser()
+        self._parser = mavlink.MAVLink(None)
+        self._parser.robust_parsing = True
+        self._rest = bytearray()
 
     @property
     def refused(self) -> tuple[int, int]:
@@ -44,17 +51,16 @@ class Wire:
 
     def restart(self) -> None:
         """Forget half a message: the line was opened anew."""
-        self._stream_parser = _new_parser()
+        self._rest = bytearray()
 
     def decode(self, data: bytes) -> list[Any]:
         """Return the messages; with signing, only those with a valid signature."""
-        # Datagrams are independent: invalid bytes in one must not hide the start of the next.
-        parser = _new_parser() if self._datagrams else self._stream_parser
-        try:
-            messages = parser.parse_buffer(bytearray(data)) or []
-        except mavlink.MAVError:
-            return []
-        return [m for m in messages if m.get_msgId() >= 0 and self._is_genuine(m)]
+        self._rest += data
+        messages = [m for m in self._take_messages() if self._is_genuine(m)]
+        if self._datagrams:
+            # They are independent: invalid bytes in one must not hide the start of the next.
+            self._rest.clear()
+        return messages
 
     def pack(self, message: Any) -> bytes:
         """Return the bytes of a message, signed when there is a key."""
@@ -67,6 +73,28 @@ class Wire:
         """Keep the time stamps of signatures on disk."""
         if self._signer is not None:
             self._signer.save(now_s, at_once=at_once)
+
+    def _take_messages(self) -> list[Any]:
+        """Take the whole messages from what has arrived.
+
+        A byte that only looks like the start of a message claims up to 279 bytes after it. When
+        their checksum is wrong, the search goes on at the next byte, not after all of them.
+        """
+        found, at, searched = [], 0, 0
+        while at < len(self._rest):
+            self._parser.buf, self._parser.buf_index = bytearray(), 0
+            message = self._parser.parse_char(self._rest[at : at + _LONGEST_BYTES])
+            if message is None:
+                break
+            if message.get_msgId() >= 0:
+                found.append(message)
+            elif self._rest[at] in _STARTS and searched < _MOST_SEARCHES:
+                searched += 1
+                at += 1
+                continue
+            at += len(message.get_msgbuf())
+        del self._rest[:at]
+        return found
 
     def _is_genuine(self, message: Any) -> bool:
         if self._signer is None or message.get_msgId() == RADIO_STATUS:
@@ -82,9 +110,3 @@ def _declared_signed(data: bytes, message: Any) -> bytes:
     body[2] |= SIGNED
     checksum = mavlink.x25crc(bytes(body[1:]) + bytes([message.crc_extra]))
     return bytes(body) + int(checksum.crc).to_bytes(CHECKSUM_BYTES, 'little')
-
-
-def _new_parser() -> Any:
-    parser = mavlink.MAVLink(None)
-    parser.robust_parsing = True
-    return parser

@@ -36,6 +36,7 @@ FLIGHT = 1000
 TOLERANCE_M = 1.0
 HOME_MSL_M, ORIGIN_MSL_M = 100.0, 110.0
 KNOWN, UNKNOWN = 0x33F, 0xA7
+ROLL_RAD = 0.1
 _SHOWN = 20
 _HERE, _THERE = ('127.0.0.1', 14551), ('127.0.0.1', 14552)
 
@@ -61,10 +62,19 @@ class ForgedReport:
 
 
 class _ForgedFlight:
-    """One flight: circles of 30 m, while the height changes between 20 and 60 m."""
+    """One flight: circles of 30 m, while the height changes between 20 and 60 m.
 
-    def __init__(self, rng: random.Random, report: ForgedReport, *, px4: bool) -> None:
-        self._rng, self._report = rng, report
+    Args:
+        rng: What is sent, and when.
+        report: Is added to.
+        px4: The dialect.
+        measures: With a rangefinder and terrain data. Without them a forged one is the first.
+    """
+
+    def __init__(
+        self, rng: random.Random, report: ForgedReport, *, px4: bool, measures: bool
+    ) -> None:
+        self._rng, self._report, self._measures = rng, report, measures
         self._limit_m = VehicleParameters().jump_limit_m + TOLERANCE_M
         dialect = Px4() if px4 else ArduPilot()
         self._assembler = Assembler(dialect, VehicleParameters())
@@ -82,6 +92,7 @@ class _ForgedFlight:
         self._now_ns, self._boot_ms = 10**9, rng.randrange(60_000, 4_000_000)
         self._sent: deque[bytes] = deque(maxlen=400)
         self._knows = True
+        self._forged_m: dict[str, float] = {}
 
     def fly(self, messages: int) -> None:
         """Fly until so many hostile messages were sent."""
@@ -118,6 +129,11 @@ class _ForgedFlight:
         angle = self._boot_ms / 10_000.0
         return 30.0 * cos(angle), 30.0 * sin(angle), -40.0 - 20.0 * sin(angle / 2.0)
 
+    @property
+    def _above_m(self) -> float:
+        """Above home, which lies as high as the ground."""
+        return ORIGIN_MSL_M - HOME_MSL_M - self._place_m[2]
+
     def _heartbeat(self, mode: int | None = None, base: int = 0x81) -> Any:
         mode = self._mode if mode is None else mode
         return mavlink.MAVLink_heartbeat_message(2, self._autopilot, base, mode, 4, 3)
@@ -148,22 +164,34 @@ class _ForgedFlight:
         mm = round(above_m * 1000)
         return mavlink.MAVLink_global_position_int_message(boot_ms, 0, 0, 0, mm, 0, 0, 0, 0)
 
-    def _fix(self, fix_type: int) -> Any:
-        return mavlink.MAVLink_gps_raw_int_message(0, fix_type, 0, 0, 0, 0, 0, 0, 0, 0)
+    def _fix(self, fix_type: int, above_home_m: float) -> Any:
+        msl_mm = round((HOME_MSL_M + above_home_m) * 1000)
+        return mavlink.MAVLink_gps_raw_int_message(0, fix_type, 0, 0, msl_mm, 0, 0, 0, 0, 0)
+
+    def _range(self, distance_m: float) -> Any:
+        cm, down = max(0, round(distance_m * 100)), mavlink.MAV_SENSOR_ROTATION_PITCH_270
+        # Not a distance is 0, which is below the least one.
+        return mavlink.MAVLink_distance_sensor_message(
+            self._boot_ms, 20, 20_000, min(cm, 65_535), 0, 0, down, 255
+        )
+
+    def _terrain(self, above_m: float) -> Any:
+        return mavlink.MAVLink_terrain_report_message(0, 0, 100, 0, above_m, 0, 0)
 
     def _true(self) -> list[Any]:
         angle = self._boot_ms / 10_000.0
         velocity = (-3.0 * sin(angle), 3.0 * cos(angle), -1.0 * cos(angle / 2.0))
-        place = self._place_m
-        above_m = ORIGIN_MSL_M - HOME_MSL_M - place[2]
+        place, above_m = self._place_m, self._above_m
+        measured = [self._range(above_m / cos(ROLL_RAD)), self._terrain(above_m)]
         return [
+            *(measured if self._measures else ()),
             self._heartbeat(),
             self._landed(2),
             self._flags(KNOWN if self._knows else UNKNOWN),
-            self._fix(3 if self._knows else 1),
+            self._fix(3 if self._knows else 1, above_m),
             self._height(self._boot_ms, above_m),
             self._position(self._boot_ms, place, velocity),
-            mavlink.MAVLink_attitude_message(self._boot_ms, 0.1, 0, angle % 3.0, 0, 0, 0),
+            mavlink.MAVLink_attitude_message(self._boot_ms, ROLL_RAD, 0, angle % 3.0, 0, 0, 0),
         ]
 
     def _hostile(self) -> tuple[str, bytes, tuple[str, int]]:
@@ -210,11 +238,24 @@ class _ForgedFlight:
             'heartbeat': lambda: self._heartbeat(rng.randrange(2**32), rng.choice((1, 0x81))),
             'landed': lambda: self._landed(rng.randrange(5)),
             'flags': lambda: self._flags(rng.choice((KNOWN, UNKNOWN, 0, 0xFFFF))),
-            'fix': lambda: self._fix(rng.randrange(9)),
+            'fix': lambda: self._fix(rng.randrange(9), rng.choice((0.0, wrong_m))),
+            'range': lambda: self._range(self._unlike_before(kind)),
+            'terrain': lambda: self._terrain(
+                self._unlike_before(kind) if rng.random() < 0.5 else rng.choice((1e20, nan))
+            ),
             'attitude': lambda: mavlink.MAVLink_attitude_message(boot_ms, *angles, 0, 0, 0),
             'text': lambda: mavlink.MAVLink_statustext_message(2, text, rng.randrange(3), 0),
         }
         return forgeries[kind]()
+
+    def _unlike_before(self, kind: str) -> float:
+        """Return a height that neither the truth nor the one forged before agrees with."""
+        while True:
+            height_m = self._rng.uniform(1.0, 199.0)
+            before_m = self._forged_m.get(kind, inf)
+            if min(abs(height_m - self._above_m), abs(height_m - before_m)) > 2 * self._limit_m:
+                self._forged_m[kind] = height_m
+                return height_m
 
     def _send(self, message: Any) -> None:
         data = bytes(message.pack(self._codec))
@@ -236,8 +277,8 @@ class _ForgedFlight:
         self._report.believed += count and self._knows and told.pose is not None
         if told.pose is not None and not self._knows:
             self._blame(kind, 'a position while the filter has none')
-        north_m, east_m, down_m = self._place_m
-        above_m = ORIGIN_MSL_M - HOME_MSL_M - down_m
+        north_m, east_m, _ = self._place_m
+        above_m = self._above_m
         for pose in (*self._assembler.poses, *(() if told.pose is None else (told.pose,))):
             if pose.has_position:
                 off_m = max(abs(pose.north_m - north_m), abs(pose.east_m - east_m))
@@ -246,6 +287,10 @@ class _ForgedFlight:
             off_m = abs(pose.altitude_agl_m - above_m)
             if not off_m <= self._limit_m:
                 self._blame(kind, f'a height {off_m:.1f} m off')
+        for height in told.heights:
+            true_m = above_m if height.above_ground else HOME_MSL_M + above_m
+            if not abs(height.height_m - true_m) <= self._limit_m:
+                self._blame(kind, f'{height.source} {height.height_m - true_m:.1f} m off')
         self._assembler.poses.clear()
         if self._assembler.reboots:
             self._blame(kind, 'a reboot')
@@ -258,7 +303,7 @@ class _ForgedFlight:
 
 _FORGERIES = (
     *('place', 'absurd', 'height', 'home', 'origin', 'heartbeat', 'landed'),
-    *('flags', 'fix', 'attitude', 'text'),
+    *('flags', 'fix', 'range', 'terrain', 'attitude', 'text'),
 )
 
 
@@ -272,7 +317,8 @@ def run_forged(messages: int, seed: int = 0) -> ForgedReport:
     report = ForgedReport()
     for number, first in enumerate(range(0, messages, FLIGHT)):
         rng = random.Random(f'{seed} {number}')
-        _ForgedFlight(rng, report, px4=bool(number % 2)).fly(min(FLIGHT, messages - first))
+        flight = _ForgedFlight(rng, report, px4=bool(number % 2), measures=number % 4 < 2)
+        flight.fly(min(FLIGHT, messages - first))
     report.kinds = dict(Counter(report.kinds).most_common())
     return report
 

@@ -26,6 +26,7 @@ from peace_ros.core.domain import Camera, Frame, HeightReport
 from peace_ros.core.landing import State
 from peace_ros.core.vehicle.heights import RANGE_ERROR_M
 from peace_ros.lab.evaluation.wind import WindFlight
+from peace_ros.recording.run_folder import write_whole
 from peace_ros.simulation import draw_world
 from peace_ros.simulation.camera import NadirCamera
 from peace_ros.simulation.world import World
@@ -253,7 +254,9 @@ def main(args: Sequence[str] | None = None) -> int:
     settings = {'px4': given.px4, 'wind_m_s': given.wind, 'tell': True}
     flown = fly([*broken, *[None] * given.sound], given.sources, **settings)
     if given.json is not None:
-        given.json.write_text(json.dumps([asdict(each) for each in flown], indent=2) + '\n')
+        write_whole(
+            given.json, json.dumps([asdict(each) for each in flown], indent=2) + '\n', 'flights'
+        )
     found = [each for each in flown if each.fault]
     sound = [each for each in flown if not each.fault]
     unnoticed = sum(not each.is_good for each in found)

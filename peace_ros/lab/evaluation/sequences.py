@@ -31,6 +31,7 @@ from peace_ros.core.landing.parameters import CELL_SCORE_FLOOR, LandingParameter
 from peace_ros.core.landing.situation import Sighting
 from peace_ros.core.landing.states import LOOKING, STILL_STATES, TRANSITIONS, State
 from peace_ros.core.landing.watch import at_safe_altitude, valid_pose
+from peace_ros.recording.run_folder import write_whole
 
 LENGTH = 12
 """Moments of a sequence."""
@@ -242,7 +243,8 @@ class Trial:
             -self._p.z_speed_climbing <= v[2] <= self._p.z_speed_landing
         ):
             yield 'speed is limited'
-        if lateral > 0.0 and pose is not None and not at_safe_altitude(pose, self._p):
+        above_m = moment.heights.above_lowest_m
+        if lateral > 0.0 and pose is not None and not at_safe_altitude(pose, self._p, above_m):
             site = seen.reachable
             if site is None or site.distance_m(pose) > site.clearance_m:
                 yield 'no lateral motion below the safe altitude but within the clearance'
@@ -357,7 +359,7 @@ def main(args: Sequence[str] | None = None) -> int:
     report = run(given.sequences, given.seed, given.length, tell=True)
     sys.stderr.write('\n')
     if given.json is not None:
-        given.json.write_text(json.dumps(vars(report), indent=2) + '\n')
+        write_whole(given.json, json.dumps(vars(report), indent=2) + '\n', 'flights')
     lines = [
         f'{report.sequences} sequences, {report.moments} moments, seed {given.seed}',
         f'{report.descents} commands to descend, {report.handovers} hand-overs',

@@ -4,13 +4,17 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import logging
+import os
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import monotonic
 from typing import IO, Any
 from urllib.parse import urljoin, urlsplit
 from urllib.request import url2pathname
@@ -27,6 +31,8 @@ _CHUNK_BYTES = 1 << 18
 _MOST_JSON_BYTES = 1 << 20
 _NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.\-]*')
 _SCHEMES = ('http', 'https', 'file')
+_LONGEST_S = 4 * 3600.0
+"""Of a whole fetch: a server that sends a byte now and then must not hold it without an end."""
 
 
 def fetch_bundle(name: str, index: str, folder: Path, progress: Progress) -> Bundle:
@@ -47,21 +53,24 @@ def fetch_bundle(name: str, index: str, folder: Path, progress: Progress) -> Bun
     where = index if '://' in index else Path(index).expanduser().absolute().as_uri()
     folder = folder.expanduser().absolute()
     parts = folder.with_name(f'.{folder.name}.part')
+    end_s = monotonic() + _LONGEST_S
     try:
         with TemporaryDirectory() as aside:
-            listing = _retrieve(where, Path(aside) / 'index.json', None, _MOST_JSON_BYTES)
+            listing = _retrieve(where, Path(aside) / 'index.json', None, _MOST_JSON_BYTES, end_s)
             entry = _entry(name, where, listing.read_bytes())
         base = urljoin(where, str(entry['url']).rstrip('/') + '/')
-        parts.mkdir(parents=True, exist_ok=True)
-        # A manifest is small and may have changed: it is always downloaded anew.
-        (parts / MANIFEST_NAME).unlink(missing_ok=True)
-        path = _retrieve(
-            base + MANIFEST_NAME, parts / MANIFEST_NAME, str(entry['sha256']), _MOST_JSON_BYTES
-        )
-        for file, expected in parse_manifest(path.read_bytes(), str(path)).files.items():
-            _retrieve(base + file, parts / file, expected.sha256, expected.bytes, progress)
-        Bundle.load(parts)
-        put_in_place(parts, folder)
+        _refuse_less_safe(where, base)
+        with _alone(parts):
+            # A manifest is small and may have changed: it is always downloaded anew.
+            (parts / MANIFEST_NAME).unlink(missing_ok=True)
+            known = str(entry['sha256'])
+            place = parts / MANIFEST_NAME
+            path = _retrieve(base + MANIFEST_NAME, place, known, _MOST_JSON_BYTES, end_s)
+            for file, expected in parse_manifest(path.read_bytes(), str(path)).files.items():
+                place, known = parts / file, expected.sha256
+                _retrieve(base + file, place, known, expected.bytes, end_s, progress)
+            Bundle.load(parts)
+            put_in_place(parts, folder)
     except OSError as error:
         raise BundleError(
             f'{folder}: {error.strerror or error}; free some space or choose another folder '
@@ -84,10 +93,45 @@ def _entry(name: str, index: str, content: bytes) -> dict[str, Any]:
     return entry
 
 
+def _refuse_less_safe(from_url: str, to_url: str) -> None:
+    """Refuse an index or a redirection that leads to a less safe kind of address."""
+    before, after = urlsplit(from_url).scheme, urlsplit(to_url).scheme
+    if (before == 'https' and after != 'https') or (before != 'file' and after == 'file'):
+        raise BundleError(
+            f'{from_url} leads to {to_url}: from {before} only {before} or https may follow; ask '
+            'the maintainer of the index'
+        )
+
+
+@contextmanager
+def _alone(parts: Path) -> Iterator[None]:
+    """Make the folder of a download, and keep others out of it meanwhile."""
+    if parts.is_symlink():
+        raise BundleError(f'{parts} is a symbolic link: remove it')
+    parts.mkdir(parents=True, exist_ok=True)
+    handle = os.open(parts, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError as error:
+        raise BundleError(
+            f'{parts}: another download of this bundle is under way: wait for its end'
+        ) from error
+    finally:
+        os.close(handle)
+
+
 def _retrieve(
-    url: str, path: Path, sha256: str | None, most_bytes: int, progress: Progress | None = None
+    url: str,
+    path: Path,
+    sha256: str | None,
+    most_bytes: int,
+    end_s: float,
+    progress: Progress | None = None,
 ) -> Path:
     """Let pooch download and check a file unless it is there already; return its path."""
+    if path.is_symlink():
+        path.unlink()  # nothing outside of the folder is read or written
     try:
         import pooch  # noqa: PLC0415 - an extra, for this verb alone
         import requests  # noqa: PLC0415 - comes with pooch
@@ -101,7 +145,7 @@ def _retrieve(
     pooch.get_logger().setLevel(logging.WARNING)
     try:
         known = None if sha256 is None else f'sha256:{sha256}'
-        download = _Download(path, most_bytes, progress)
+        download = _Download(path, most_bytes, end_s, progress)
         pooch.retrieve(url, known, path.name, path.parent, downloader=download)
     except ValueError as error:
         raise BundleError(
@@ -119,16 +163,28 @@ def _retrieve(
 class _Download:
     """A downloader for pooch that continues a partial file and stops at the announced size."""
 
-    def __init__(self, path: Path, most_bytes: int, progress: Progress | None) -> None:
+    def __init__(
+        self, path: Path, most_bytes: int, end_s: float, progress: Progress | None
+    ) -> None:
         self._path, self._most_bytes, self._progress = path, most_bytes, progress
+        self._end_s = end_s
+        self._url = ''
         self._file: IO[bytes]
 
     def __call__(self, url: str, target: str, _: Any) -> None:
         """Download to the file that pooch will check."""
         from pooch import HTTPDownloader  # noqa: PLC0415
 
+        self._url = url
         if urlsplit(url).scheme == 'file':
-            shutil.copyfile(url2pathname(urlsplit(url).path), target)
+            source = Path(url2pathname(urlsplit(url).path))
+            if source.exists() and (
+                not source.is_file() or source.stat().st_size > self._most_bytes
+            ):
+                raise BundleError(
+                    f'{source} is not a file of at most {self._most_bytes} bytes: check --index'
+                )
+            shutil.copyfile(source, target)
             return
         with self._path.open('ab') as self._file:
             headers = {'Accept-Encoding': 'identity'}
@@ -142,6 +198,7 @@ class _Download:
 
     def _begin(self, response: Any, **_: Any) -> None:
         """Start over where a server ignores ranges and sends the whole file again."""
+        _refuse_less_safe(self._url, response.url)
         if response.status_code == 200:
             self._file.seek(0)
             self._file.truncate()
@@ -155,6 +212,11 @@ class _Download:
             raise BundleError(
                 f'{self._path.name}: more than the announced {self._most_bytes} bytes came; it was '
                 'removed, ask the maintainer of the index'
+            )
+        if monotonic() > self._end_s:
+            raise BundleError(
+                f'{self._path.name}: the download takes longer than {_LONGEST_S / 3600:g} h: call '
+                'again, it continues where it stopped'
             )
         if self._progress:
             self._progress(self._path.name, have, self._most_bytes)

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import json
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -18,6 +20,7 @@ from peace_ros.core.domain import BundleError
 from peace_ros.core.inference.bundle import MANIFEST_NAME, sha256_of
 from peace_ros.core.inference.manifest import FORMAT, ROLES_BY_FAMILY, InputSpec
 
+_AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # fcntl.h, linux/fs.h
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -88,8 +91,13 @@ def file_entry(path: Path) -> dict[str, str | int]:
 def put_in_place(stage: Path, folder: Path) -> None:
     """Let a finished folder take the place of another beside it; raises OSError.
 
-    An older bundle is set aside first and comes back when the new one cannot be moved.
+    Both are exchanged in one step where the file system can, so that a kill at any time leaves a
+    bundle of that name. Elsewhere an older bundle is set aside first, and comes back when the new
+    one cannot be moved.
     """
+    if folder.exists() and _exchanged(stage, folder):
+        shutil.rmtree(stage, ignore_errors=True)
+        return
     old = folder.with_name(f'.{folder.name}.old')
     if folder.exists():
         shutil.rmtree(old, ignore_errors=True)
@@ -101,3 +109,13 @@ def put_in_place(stage: Path, folder: Path) -> None:
             old.rename(folder)
         raise
     shutil.rmtree(old, ignore_errors=True)
+
+
+def _exchanged(one: Path, other: Path) -> bool:
+    """Exchange two names by renameat2(2); return whether it was done."""
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except (AttributeError, OSError):  # a system without it
+        return False
+    names = (os.fsencode(one), os.fsencode(other))
+    return bool(rename(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _RENAME_EXCHANGE) == 0)

@@ -117,6 +117,13 @@ def _defect(
     bench.restore('landing')
 
 
+def _intruder(bench: FlightBench, topic: str) -> Course:
+    """Somebody else publishes a topic, too; nothing comes from there."""
+    publisher = bench.node.add_publisher(topic)
+    yield None
+    bench.node.remove_publisher(publisher)
+
+
 def _model(bench: FlightBench, fault: str, revive: bool = False) -> Course:
     """The segmentation model fails; ``revive`` starts a node again that ended by it."""
     bench.node.fail_model(fault)
@@ -317,7 +324,7 @@ _KINDS: dict[str, Callable[..., Course]] = {
     each.__name__.removeprefix('_'): each
     for each in (
         *(_autopilot, _second_companion, _forged_telemetry, _kill, _suspend, _stall, _defect),
-        *(_model, _bundle, _clock_step, _person, _full_disk, _together),
+        *(_intruder, _model, _bundle, _clock_step, _person, _full_disk, _together),
     )
 }
 TAMPERS: dict[str, Callable[..., Tamper]] = {**tamper.TAMPERS, **line.TAMPERS}

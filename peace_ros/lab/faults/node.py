@@ -156,6 +156,15 @@ class BenchNode(Listener):
         """Call the landing node's service; nobody waits for the answer."""
         self._engage.call_async(Trigger.Request())
 
+    def add_publisher(self, topic: str) -> Any:
+        """Return one more publisher of a relayed topic."""
+        kind, _, out = _RELAYED[topic]
+        return self.node.create_publisher(kind, topic, out)
+
+    def remove_publisher(self, publisher: Any) -> None:
+        """End a publisher that was added."""
+        self.node.destroy_publisher(publisher)
+
     def fail_model(self, fault: str) -> None:
         """Tell the segmentation node how its model has to fail; empty: not at all."""
         self._model.publish(String(data=fault))

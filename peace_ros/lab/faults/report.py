@@ -17,6 +17,7 @@ from rich.table import Table
 from peace_ros import __version__
 from peace_ros.core.domain import RecordingError
 from peace_ros.lab.faults.run import Results, Row
+from peace_ros.recording.run_folder import write_whole
 
 _TAKE_OVERS = 'pilot_'
 _DEAD_MAN = 'executor_stalls'
@@ -70,8 +71,7 @@ def write(told: dict[str, Any], path: Path) -> None:
         RecordingError: the file cannot be written.
     """
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(told, indent=2) + '\n', encoding='utf-8')
+        write_whole(path, json.dumps(told, indent=2) + '\n', 'report')
     except OSError as error:
         raise RecordingError(
             f'report {path} cannot be written ({error}): give a file in a writable folder'

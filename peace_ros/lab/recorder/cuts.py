@@ -26,7 +26,8 @@ from peace_ros.lab.recorder.landing_topics import (
     newest_recording,
     recorder_process,
 )
-from peace_ros.lab.replay.source import SourceOptions, open_source
+from peace_ros.lab.replay.source import open_source
+from peace_ros.lab.replay.source_options import SourceOptions
 from peace_ros.recording import BagReader
 from peace_ros.simulation.demo.isolation import isolate
 

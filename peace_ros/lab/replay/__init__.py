@@ -4,7 +4,8 @@
 
 from peace_ros.lab.replay.report import ReplayReport
 from peace_ros.lab.replay.run import Replayer, ReplayOptions, replay
-from peace_ros.lab.replay.source import SourceOptions, open_source
+from peace_ros.lab.replay.source import open_source
+from peace_ros.lab.replay.source_options import SourceOptions
 
 __all__ = [
     'ReplayOptions',

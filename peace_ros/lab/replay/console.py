@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from peace_ros.lab.replay import run
+from peace_ros.lab.replay.outputs import QUIET_STATES
 from peace_ros.lab.replay.regression import GoldenOptions, Regression, replay_regression
 from peace_ros.lab.replay.report import ReplayReport
 from peace_ros.lab.replay.trace import described
@@ -107,6 +108,12 @@ def _checks(result: Regression) -> Table:
     return table
 
 
+def _visit(state: dict[str, float | str]) -> str:
+    """Return name and time of a visit, and why the vehicle waited or was given back."""
+    reason = f' ({state["reason"]})' if state['name'] in QUIET_STATES else ''
+    return f'{state["name"]} {float(state["seconds"]):.1f} s{reason}'
+
+
 def _table(report: ReplayReport, folder: Path) -> Table:
     table = Table(show_header=False)
     table.add_column(no_wrap=True)
@@ -114,15 +121,15 @@ def _table(report: ReplayReport, folder: Path) -> Table:
     frames = f'{report.frames}'
     if report.unusable_frames:
         frames += f', {report.unusable_frames} unusable: {report.first_fault}'
-    states = ', '.join(f'{each["name"]} {float(each["seconds"]):.1f} s' for each in report.states)
+    states = ', '.join(map(_visit, report.states))
     fates = ', '.join(f'{count} {fate}' for fate, count in report.heatmaps.items())
     altitudes = 'none'
     if report.altitudes_m is not None:
         altitudes = '{:.1f} to {:.1f} m above ground'.format(*report.altitudes_m)
     for name, value in (
+        *(('note', each) for each in report.remarks),
         ('recording', report.source),
         ('frames', frames),
-        *(('note', each) for each in report.remarks),
         ('altitude', altitudes),
         (
             'recorded',
@@ -136,5 +143,5 @@ def _table(report: ReplayReport, folder: Path) -> Table:
         ('outcome', report.outcome or 'none by the end of the recording'),
         ('results', str(folder)),
     ):
-        table.add_row(name, value)
+        table.add_row(name, Text(value))  # a path may look like markup
     return table

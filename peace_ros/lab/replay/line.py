@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from peace_ros.core.domain import Camera, Frame, Mount, Pose, Telemetry
+from peace_ros.core.domain.geometry import camera_pose, interpolate
 from peace_ros.core.landing import Decision
 from peace_ros.core.pipeline import Pipeline, SegmentedFrame, create_landing
 from peace_ros.core.presets import Preset
@@ -63,6 +64,7 @@ class ReplayLine:
         """
         self.pipeline = Pipeline.from_preset(preset, threads=threads)
         self.landing = create_landing(preset, camera, mount)
+        self._mount = mount
         self._poses = poses
         self._stamps = [pose.stamp_ns for pose in poses]
         self._fed = 0
@@ -107,6 +109,14 @@ class ReplayLine:
             decision = self.landing.step(now_ns, self._telemetry(now_ns, pose), age_s)
             yield Step(now_ns, decision, pose)
             self._now_ns = now_ns + STEP_NS
+
+    def camera_pose_at(self, stamp_ns: int) -> Pose | None:
+        """Return the pose of the camera between two recorded ones, None outside of them."""
+        index = bisect_right(self._stamps, stamp_ns)
+        if not 0 < index < len(self._poses):
+            return None
+        before, after = self._poses[index - 1 : index + 1]
+        return camera_pose(self._mount, interpolate(before, after, stamp_ns))
 
     def _feed_poses(self, stamp_ns: int) -> None:
         """Give the landing core every pose up to the first that is not before the stamp."""

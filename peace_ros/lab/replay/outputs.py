@@ -24,7 +24,7 @@ from peace_ros.recording.messages import diagnostic_array, heatmap_to_image, jpe
 
 _CELLS = 20
 _OK, _WARN = 0, 1
-_QUIET_STATES = frozenset({'HOLD', 'ABORTED'})
+QUIET_STATES = frozenset({'HOLD', 'ABORTED'})
 
 
 @final
@@ -88,7 +88,7 @@ class ReplayOutputs:
     def add_step(self, step: Step) -> None:
         """Write a decision as ``landing/status``."""
         decision = step.decision
-        level = _WARN if decision.state.value in _QUIET_STATES else _OK
+        level = _WARN if decision.state.value in QUIET_STATES else _OK
         pairs = decision_pairs(decision, step.pose).items()
         message = diagnostic_array(step.stamp_ns, 'landing', level, decision.reason, pairs)
         self._bag.write('/landing/status', step.stamp_ns, message)

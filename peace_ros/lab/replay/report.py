@@ -41,7 +41,7 @@ class ReplayReport:
     prompts: list[str] = field(default_factory=list)
     """Distinct templates, in order."""
     states: list[dict[str, float | str]] = field(default_factory=list)
-    """Visits of states: name and seconds."""
+    """Visits of states: name, seconds and the first reason."""
     verdicts: dict[str, int] = field(default_factory=dict)
     """SITE and NO_ZONE -> decisions."""
     heatmaps: dict[str, int] = field(default_factory=dict)
@@ -116,7 +116,7 @@ class ReportBuilder:
             elapsed_s = (step.stamp_ns - self._state_since_ns) * 1e-9
             report.states[-1]['seconds'] = round(elapsed_s, 3)
         if not report.states or report.states[-1]['name'] != name:
-            report.states.append({'name': name, 'seconds': 0.0})
+            report.states.append({'name': name, 'seconds': 0.0, 'reason': decision.reason})
             self._state_since_ns = step.stamp_ns
         self._verdicts[decision.verdict.kind.value] += 1
         report.verdicts = dict(self._verdicts)

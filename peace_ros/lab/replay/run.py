@@ -14,6 +14,7 @@ from peace_ros.core.domain import NADIR, Mount, PeaceError, RecordingError
 from peace_ros.core.node_parameters import CameraOptions
 from peace_ros.core.pipeline import SegmentedFrame
 from peace_ros.core.presets import DEFAULT_PRESET, Preset, load_preset
+from peace_ros.lab.replay.altitude_check import AltitudeCheck
 from peace_ros.lab.replay.assignments import with_assignments
 from peace_ros.lab.replay.excerpt import Excerpt
 from peace_ros.lab.replay.line import ReplayLine, Step
@@ -22,11 +23,11 @@ from peace_ros.lab.replay.recorded import recorded_preset
 from peace_ros.lab.replay.report import ReplayReport, ReportBuilder
 from peace_ros.lab.replay.source import (
     RecordingSource,
-    SourceOptions,
     Taken,
     VideoSource,
     open_source,
 )
+from peace_ros.lab.replay.source_options import SourceOptions
 from peace_ros.lab.replay.trace import TraceBuilder
 from peace_ros.recording.run_folder import create_run_folder
 
@@ -172,6 +173,7 @@ class Replayer:
         """
         began = time.monotonic()
         line: ReplayLine | None = None
+        altitudes: AltitudeCheck | None = None
         last_ns = 0
         for taken in self._frames():
             if taken.frame is None:
@@ -179,6 +181,10 @@ class Replayer:
                 continue
             if line is None:
                 line = self._line(taken)
+                altitudes = AltitudeCheck(
+                    self._source.options.assumed_camera(*taken.frame.size_px),
+                    are_recorded=self._source.altitudes_are_recorded,
+                )
             last_ns = taken.stamp_ns
             if gap_s := line.skip_gap(taken.stamp_ns):
                 self.report.remarks.append(f'nothing was recorded for {gap_s:.0f} s: left out')
@@ -191,12 +197,18 @@ class Replayer:
                 self._builder.add_fault(str(error))
                 continue
             self._builder.add_look(look)
+            if (pose := line.camera_pose_at(taken.stamp_ns)) is not None and altitudes is not None:
+                altitudes.add(taken.frame, pose)
             self.report.elapsed_s = time.monotonic() - began
             yield look
         if line is not None:
             for step in line.steps_until(last_ns + _TAIL_NS):
                 self._builder.add_step(step)
                 yield step
+        told = self.report.remarks
+        told += [each for each in self._source.remarks if each not in told]
+        if altitudes is not None and (doubt := altitudes.remark()) is not None:
+            told.insert(0, doubt)
         self.report.elapsed_s = time.monotonic() - began
 
     def _frames(self) -> Iterator[Taken]:

@@ -1,21 +1,17 @@
 # Copyright 2026 The peace_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where a replay gets its frames and poses: a bag, or a video with an assumed altitude."""
+"""Where a replay gets its frames and poses: a bag or a video, and maybe a log of the flight."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import isfinite
 from pathlib import Path
-from typing import Annotated, Protocol
-
-from typer import Option
+from typing import Protocol
 
 from peace_ros.core.domain import (
     NADIR,
-    Camera,
     Frame,
     Mount,
     PeaceError,
@@ -23,7 +19,6 @@ from peace_ros.core.domain import (
     RecordingError,
     VehicleError,
 )
-from peace_ros.core.domain.geometry import mount_from_degrees
 from peace_ros.core.messages import (
     diagnostic_values,
     frame_from_message,
@@ -31,112 +26,19 @@ from peace_ros.core.messages import (
     pose_from_message,
     stamp_ns_of,
 )
-from peace_ros.lab.replay.calibration import DEFAULT_FOV_DEG, RecordedCalibration
+from peace_ros.lab.replay.calibration import RecordedCalibration
+from peace_ros.lab.replay.source_options import DEFAULT_ALTITUDE, SourceOptions
 from peace_ros.recording import AltitudeProfile, BagReader, VideoReader
+from peace_ros.recording.flight_log import subtitles_of
 from peace_ros.recording.messages import IMAGE_TYPES, POSE_TYPES
 from peace_ros.recording.storages import STORAGES, is_recording
-from peace_ros.recording.video import VIDEO_SUFFIXES
+from peace_ros.recording.video import FIRST_STAMP_NS, VIDEO_SUFFIXES
 
-DEFAULT_ALTITUDE = '100:20'
-_LARGEST_TURN_DEG = 360.0
 _CLOCKS_APART_S = 3600.0
 """A recording may begin long before its first image; clocks that differ, differ by more."""
 _STATUS_TOPIC = '/landing/status'
 _PREFERRED_IMAGES = ('/image', '/image/compressed')
 _PREFERRED_POSES = ('/ground_truth/pose', '/pose')
-
-
-@dataclass(frozen=True)
-class SourceOptions:
-    """Which part of a recording is replayed, and what it does not say itself."""
-
-    image_topic: Annotated[
-        str | None, Option(help='Image or CompressedImage; default: the only one, or /image.')
-    ] = None
-    pose_topic: Annotated[
-        str | None,
-        Option(
-            help='PoseStamped, PoseWithCovarianceStamped or Odometry, in ENU; default: the only '
-            'one, or /ground_truth/pose.'
-        ),
-    ] = None
-    fov_x_deg: Annotated[
-        float | None,
-        Option(
-            '--fov',
-            metavar='DEG',
-            help='Full horizontal field of view; default: the camera_info beside the image, '
-            'else 73.',
-        ),
-    ] = None
-    mount_roll_deg: Annotated[
-        float | None,
-        Option('--mount-roll', metavar='DEG', help='The camera looks so far to the left.'),
-    ] = None
-    mount_pitch_deg: Annotated[
-        float | None,
-        Option('--mount-pitch', metavar='DEG', help='The camera looks so far ahead.'),
-    ] = None
-    mount_yaw_deg: Annotated[
-        float | None,
-        Option(
-            '--mount-yaw',
-            metavar='DEG',
-            help='The top of the image is so far to the right of the nose; default of all three: '
-            '/tf_static from base_link to the frame_id of the images, else 0.',
-        ),
-    ] = None
-    altitude: Annotated[
-        str, Option(metavar='START:END', help='Metres, linear over the file; for videos.')
-    ] = DEFAULT_ALTITUDE
-    ground_m: Annotated[
-        float,
-        Option(
-            '--ground',
-            metavar='M',
-            help='z of the ground in the poses of a bag, where they do not count from there but '
-            'from sea level or the place of arming.',
-        ),
-    ] = 0.0
-    every: Annotated[int, Option(metavar='N', help='Take every N-th frame.')] = 1
-    hz: Annotated[
-        float | None, Option(metavar='HZ', help='Take at most HZ frames per recorded second.')
-    ] = None
-    limit: Annotated[int | None, Option(metavar='N', help='Stop after N frames.')] = None
-
-    def __post_init__(self) -> None:
-        if self.every < 1:
-            raise RecordingError(f'--every {self.every}: give 1 or more')
-        if not isfinite(self.ground_m):
-            raise RecordingError(f'--ground {self.ground_m}: give the metres of z at the ground')
-        if self.hz is not None and not 0.0 < self.hz <= 1000.0:
-            raise RecordingError(f'--hz {self.hz}: give more than 0 and at most 1000')
-        if self.limit is not None and self.limit < 1:
-            raise RecordingError(f'--limit {self.limit}: give 1 or more')
-        if self.fov_x_deg is not None and not 5.0 <= self.fov_x_deg <= 150.0:
-            raise RecordingError(f'--fov {self.fov_x_deg} deg: give 5 to 150')
-        for name, turn_deg in zip(('roll', 'pitch', 'yaw'), self._turns_deg, strict=True):
-            if turn_deg is not None and not abs(turn_deg) <= _LARGEST_TURN_DEG:
-                raise RecordingError(
-                    f'--mount-{name} {turn_deg} deg: give -{_LARGEST_TURN_DEG:g} to '
-                    f'{_LARGEST_TURN_DEG:g}'
-                )
-
-    @property
-    def _turns_deg(self) -> tuple[float | None, float | None, float | None]:
-        return self.mount_roll_deg, self.mount_pitch_deg, self.mount_yaw_deg
-
-    @property
-    def mount(self) -> Mount | None:
-        """How the user says that the camera is mounted, None where nothing was said."""
-        roll, pitch, yaw = self._turns_deg
-        if roll is pitch is yaw is None:
-            return None
-        return mount_from_degrees((roll or 0.0, pitch or 0.0, yaw or 0.0), (0.0, 0.0, 0.0))
-
-    def assumed_camera(self, width_px: int, height_px: int) -> Camera:
-        """Return the camera of frames of a size that come without a calibration."""
-        return Camera.from_degrees(width_px, height_px, self.fov_x_deg or DEFAULT_FOV_DEG)
 
 
 @dataclass(frozen=True)
@@ -159,6 +61,8 @@ class RecordingSource(Protocol):
     """How the camera sits on the vehicle."""
     poses: list[Pose]
     """In the order of their stamps."""
+    altitudes_are_recorded: bool
+    """Otherwise the user or a default gave them."""
     engage_ns: int | None
     """When the recorded landing began; None engages with the first frame."""
     remarks: list[str]
@@ -200,33 +104,59 @@ class _Picker:
 
 
 class VideoSource:
-    """A video, its camera assumed level above the origin."""
+    """A video; its poses come from a log, else it is assumed to look straight down."""
 
     def __init__(self, path: Path, options: SourceOptions) -> None:
         self.path = path
         self.options = options
         self.mount = options.mount or NADIR
-        self._reader = VideoReader(path, AltitudeProfile.parse(options.altitude))
+        self._reader = VideoReader(path)
         self.count = _Picker(options).about(self._reader.count)
-        self.poses = [self._reader.pose(index) for index in range(self._reader.count)]
+        self.remarks: list[str] = []
+        self.altitudes_are_recorded = True
+        self.poses = self._poses()
+        self.remarks += self._reader.remarks
         self.engage_ns: int | None = None
-        self.remarks = [
-            f'no altitude was recorded: {options.altitude} m is assumed, linear (--altitude)'
-        ]
         self.frame_hz = self._reader.frame_hz / options.every
 
     def frames(self) -> Iterator[Taken]:
-        """Yield the chosen frames; raises RecordingError when the file breaks off."""
-        picker = _Picker(self.options)
-        for _, frame in self._reader.frames():
-            if picker.takes(frame.stamp_ns):
-                yield Taken(frame.stamp_ns, frame)
+        """Yield the chosen frames; those that cannot be decoded with their fault."""
+        picker, told, last_ns = _Picker(self.options), len(self._reader.remarks), -1
+        for stamp_ns, rgb, fault in self._reader.pictures():
+            if picker.takes(stamp_ns):
+                told_fault = _order_fault(stamp_ns, last_ns) or fault
+                frame = None if rgb is None or told_fault else Frame(rgb, stamp_ns)
+                last_ns = max(last_ns, stamp_ns)
+                yield Taken(stamp_ns, frame, told_fault)
             if picker.is_done:
-                return
+                break
+        self.remarks += self._reader.remarks[told:]
+
+    def _poses(self) -> list[Pose]:
+        options, end_ns = self.options, self._reader.end_ns
+        log = options.log
+        if log is None and options.altitude is None:
+            log = subtitles_of(self.path)
+        if log is None:
+            self.altitudes_are_recorded = False
+            altitude = options.altitude or DEFAULT_ALTITUDE
+            self.remarks.append(
+                f'no altitude was recorded: {altitude} m is assumed, linear (--altitude)'
+            )
+            return AltitudeProfile.parse(altitude).poses(FIRST_STAMP_NS, end_ns)
+        poses = options.read_log(log, self.remarks, FIRST_STAMP_NS)
+        if not poses or poses[0].stamp_ns > end_ns or poses[-1].stamp_ns < FIRST_STAMP_NS:
+            raise RecordingError(
+                f'no pose of {log} is within the {(end_ns - FIRST_STAMP_NS) * 1e-9:.1f} s of '
+                f'{self.path}: give --time-offset'
+            )
+        return poses
 
 
 class BagSource:
     """An image topic, its camera_info, and a pose topic of a bag."""
+
+    altitudes_are_recorded = True
 
     def __init__(self, path: Path, options: SourceOptions) -> None:
         self.path = path
@@ -235,19 +165,13 @@ class BagSource:
             self.image_topic = _choose(
                 bag, options.image_topic, IMAGE_TYPES, _PREFERRED_IMAGES, '--image-topic'
             )
-            self.pose_topic = _choose(
-                bag, options.pose_topic, POSE_TYPES, _PREFERRED_POSES, '--pose-topic'
-            )
             self.count = _Picker(options).about(bag.count(self.image_topic))
             if not self.count:
                 raise RecordingError(
                     f'topic {self.image_topic} of bag {path} has 0 messages: choose another'
                 )
             self.remarks = list(bag.remarks)
-            self.poses = [
-                replace(pose, altitude_agl_m=pose.altitude_agl_m - options.ground_m)
-                for pose in _poses(bag, self.pose_topic, self.remarks)
-            ]
+            self.poses = self._poses(bag)
             self._unstamped = _unstamped(bag, self.image_topic, self.poses, self.remarks)
             self._calibration = RecordedCalibration(
                 bag, self.image_topic, is_wanted=options.fov_x_deg is None, remarks=self.remarks
@@ -268,8 +192,7 @@ class BagSource:
                 stamp_ns = receipt_ns if self._unstamped else stamp_ns_of(message)
                 if not picker.takes(stamp_ns):
                     continue
-                if stamp_ns <= last_ns:
-                    fault = f'stamp {stamp_ns} ns is not after {last_ns} ns'
+                if fault := _order_fault(stamp_ns, last_ns) or self._clock_fault(stamp_ns):
                     yield Taken(stamp_ns, None, fault)
                     continue
                 last_ns = stamp_ns
@@ -281,6 +204,24 @@ class BagSource:
                     yield Taken(stamp_ns, None, str(error))
                 if picker.is_done:
                     return
+
+    def _clock_fault(self, stamp_ns: int) -> str:
+        """Return why a stamp is not of the clock of the poses: one alone would end the replay."""
+        after_s = (stamp_ns - self.poses[-1].stamp_ns) * 1e-9
+        if after_s <= _CLOCKS_APART_S:
+            return ''
+        return f'stamp {stamp_ns} ns is {after_s:.0f} s after the last pose: its clock jumped'
+
+    def _poses(self, bag: BagReader) -> list[Pose]:
+        options = self.options
+        if options.log is not None:
+            return options.read_log(options.log, self.remarks)
+        topic = _choose(bag, options.pose_topic, POSE_TYPES, _PREFERRED_POSES, '--pose-topic')
+        return options.above_ground(_poses(bag, topic, self.remarks))
+
+
+def _order_fault(stamp_ns: int, last_ns: int) -> str:
+    return '' if stamp_ns > last_ns else f'stamp {stamp_ns} ns is not after {last_ns} ns'
 
 
 def open_source(path: Path, options: SourceOptions) -> RecordingSource:
@@ -368,7 +309,8 @@ def _unstamped(bag: BagReader, topic: str, poses: list[Pose], remarks: list[str]
         raise RecordingError(
             f'bag {bag.path}: poses are stamped {begin_ns * 1e-9:.1f} to {end_ns * 1e-9:.1f} s, '
             f'the first image {stamp_ns * 1e-9:.1f} s, which never meet: record both with one '
-            'clock (synchronise the autopilot, or let the driver stamp in ROS time)'
+            'clock (synchronise the autopilot, or let the driver stamp in ROS time), or give '
+            '--time-offset with --log'
         )
     return unstamped
 

@@ -21,6 +21,7 @@ from peace_ros.simulation.autopilot.estimate_errors import (
 from peace_ros.simulation.autopilot.fault_port import FaultServer
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.modes import Result
+from peace_ros.simulation.autopilot.parameter_store import ParameterStore
 from peace_ros.simulation.autopilot.parameters import AutopilotParameters
 from peace_ros.simulation.autopilot.personality import Kind, Personality
 from peace_ros.simulation.autopilot.physics import Physics
@@ -59,6 +60,7 @@ class AutopilotSim:
         self.lowest_agl_m = float('inf')
         """Since it first was above 5 m; infinite before."""
         self._personality = Personality(Kind(self.parameters.autopilot))
+        self._parameter_store = ParameterStore(self._personality, self.parameters.system_id)
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._clock_offset_s = 0.0
@@ -197,6 +199,11 @@ class AutopilotSim:
         with self.lock:
             self._flight.turn_stick(yaw_rate_rad_s)
 
+    def pilot_throttle_stick(self, stick: float) -> None:
+        """Hold the throttle stick, -1 (down) to 1 (up): LOITER climbs and sinks with it."""
+        with self.lock:
+            self._flight.move_throttle(stick)
+
     def lose_gps(self, *, stale: bool = False) -> None:
         """Take GPS away; LOCAL_POSITION_NED stops, or continues with old numbers when ``stale``."""
         with self.lock:
@@ -241,8 +248,8 @@ class AutopilotSim:
         )
         errors = EstimateErrors(sizes, p.seed)
         gnss = GnssAltitudeError(p.gnss_altitude_noise_m, p.seed)
-        vision = (p.vision_delay_s, p.seed)
-        return Flight(physics, self._personality, p.home_altitude_msl_m, errors, gnss, *vision)
+        store, vision = self._parameter_store, (p.vision_delay_s, p.seed)
+        return Flight(physics, self._personality, p.datum, errors, gnss, store, *vision)
 
     def _note_altitude(self) -> None:
         altitude_m = -self._flight.physics.down_m

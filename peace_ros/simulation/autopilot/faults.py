@@ -79,6 +79,7 @@ def clear(sim: AutopilotSim) -> None:
     sim.restore_gps()
     sim.flight.barometer.become(0.0)
     sim.pilot_yaw_stick(0.0)
+    sim.pilot_throttle_stick(0.0)
     sim.flight.fence = Fence()
     sim.flight.commander = SecondCommander()
 
@@ -247,6 +248,14 @@ def pilot_mode(sim: AutopilotSim, *, mode: str) -> Answer:
 def yaw_stick(sim: AutopilotSim, *, deg_s: float) -> None:
     """Hold the pilot's yaw stick; 0 lets go."""
     sim.pilot_yaw_stick(radians(deg_s))
+
+
+@_fault
+def throttle_stick(sim: AutopilotSim, *, stick: float) -> None:
+    """Hold the pilot's throttle stick, -1 (down) to 1 (up); 0 holds the height."""
+    if not -1.0 <= stick <= 1.0:
+        raise VehicleError(f'fault throttle_stick: stick = {stick} must lie between -1 and 1')
+    sim.pilot_throttle_stick(float(stick))
 
 
 @_fault

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
-from math import isfinite
+from math import inf, isfinite
 
 from peace_ros.simulation.autopilot.commander import SecondCommander
+from peace_ros.simulation.autopilot.datum import Datum, Vector
 from peace_ros.simulation.autopilot.estimate_errors import (
     BarometerError,
     EstimateErrors,
@@ -20,9 +21,15 @@ from peace_ros.simulation.autopilot.estimate_errors import (
 )
 from peace_ros.simulation.autopilot.estimator import RECKONS_PX4_S, RECKONS_S, Estimator
 from peace_ros.simulation.autopilot.fence import Fence
-from peace_ros.simulation.autopilot.guided import PositionTarget
+from peace_ros.simulation.autopilot.guided import PlaceTarget, PositionTarget
 from peace_ros.simulation.autopilot.modes import RULES, LandedState, Mode, Result, Severity
 from peace_ros.simulation.autopilot.navigation import ExternalNavigation, Plane
+from peace_ros.simulation.autopilot.parameter_store import (
+    CRUISE_SPEED,
+    RTL_ALTITUDE,
+    TAKE_OFF_ALTITUDE,
+    ParameterStore,
+)
 from peace_ros.simulation.autopilot.personality import (
     OFFBOARD_LOSS_S,
     SETPOINT_FRAMES_PX4,
@@ -48,15 +55,17 @@ class Flight:
         self,
         physics: Physics,
         personality: Personality | None = None,
-        ground_msl_m: float = 0.0,
+        datum: Datum | None = None,
         errors: EstimateErrors | None = None,
         gnss: GnssAltitudeError | None = None,
+        parameters: ParameterStore | None = None,
         vision_delay_s: float = 0.05,
         seed: int = 0,
     ) -> None:
         self.physics = physics
         self.personality = personality or Personality()
-        self._ground_msl_m = ground_msl_m
+        self.datum = datum or Datum()
+        self.parameters = parameters or ParameterStore(self.personality)
         reckons_s = RECKONS_PX4_S if self.personality.is_px4 else RECKONS_S
         navigation = ExternalNavigation(vision_delay_s, seed, reckons_s)
         self.estimator = Estimator(reckons_s, navigation, chooses=self.personality.is_px4)
@@ -86,6 +95,7 @@ class Flight:
         self._last_position_m = self.home_m
         # A velocity set-point leaves PX4's position uncontrolled, also one of zero.
         self._steering = Steering(physics, holds_point=not self.personality.is_px4)
+        self._stick_until_s = inf
         self._on_ground_s = 0.0
         self._armed_idle_s = 0.0
         self._next_prearm_text_s = 5.0
@@ -178,8 +188,8 @@ class Flight:
         if failsafe and self.armed and not self.landed and RULES[self.mode].needs_position:
             self.say(Severity.CRITICAL, 'EKF Failsafe: changed to LAND Mode')
             self._enter(Mode.LAND)
-        if self._steering.wants_land(self.mode):
-            self._enter(Mode.LAND)
+        if self.time_s > self._stick_until_s:
+            self.move_throttle(0.0)
         rival = self.commander.due(self.time_s)
         if rival is not None:
             self.take_velocity(rival)
@@ -187,7 +197,12 @@ class Flight:
         self._watch_fence()
         self._take_off_by_mode()
         command = self._steering.command(
-            dt_s, self.mode, armed=self.armed, landed=self.landed, has_position=self.has_position
+            dt_s,
+            self.mode,
+            self.position_m,
+            armed=self.armed,
+            landed=self.landed,
+            has_position=self.has_position,
         )
         if self.mode is Mode.GUIDED and not self.personality.is_px4:
             command = self.fence.kept(command, self.position_m, self.time_s)
@@ -254,10 +269,19 @@ class Flight:
         return Result.ACCEPTED
 
     def take_off(self, altitude_m: float) -> Result:
-        """Climb to an altitude above home: only in GUIDED, armed and on the ground."""
+        """Climb to an altitude: above home, only in GUIDED, armed and on the ground (ArduPilot).
+
+        PX4: above sea level, in a mode of its own; not a number: to MIS_TAKEOFF_ALT.
+        """
         if self.personality.is_px4:
-            self._take_off_m = altitude_m - self._ground_msl_m  # its altitude is above sea level
+            above_sea_m = altitude_m - self.datum.altitude_msl_m
+            by_default = not isfinite(altitude_m)
+            self._take_off_m = (
+                self.parameters.flown(TAKE_OFF_ALTITUDE) if by_default else above_sea_m
+            )
             return self.set_mode(Mode.TAKEOFF) if self._take_off_m > 0.0 else Result.DENIED
+        if not isfinite(altitude_m):
+            return Result.DENIED
         if self.mode is not Mode.GUIDED or not self.armed or not self.landed or altitude_m <= 0.0:
             return Result.FAILED
         self._steering.take_off(altitude_m, SPOOL_UP_S)
@@ -280,6 +304,67 @@ class Flight:
             self._steering.take_velocity(target)
         else:
             self.setpoints_refused += 1
+
+    def take_place(self, target: PlaceTarget) -> None:
+        """Take a place to fly to, which only GUIDED obeys; it ends a take-off."""
+        self.setpoints += 1
+        self._setpoint_s = self.time_s
+        if self.mode is Mode.GUIDED:
+            self._steering.take_place(target)
+        else:
+            self.setpoints_refused += 1
+
+    def refuse_place(self) -> None:
+        """Take a place that cannot be: ArduPilot stops (its source text), PX4 ignores it."""
+        self.setpoints += 1
+        self.setpoints_refused += 1
+        if self.mode is Mode.GUIDED and not self.personality.is_px4:
+            self._steering.stop()
+
+    def reposition(self, target: PlaceTarget, *, change_mode: bool) -> Result:
+        """Fly to a place by DO_REPOSITION: in GUIDED, or in AUTO.LOITER of PX4.
+
+        Without the mode and without leave to change it: DENIED by ArduPilot, UNSUPPORTED by PX4
+        (their source texts, not measured).
+        """
+        mode = Mode.BRAKE if self.personality.is_px4 else Mode.GUIDED
+        if not change_mode and self.personality.is_px4:
+            return Result.UNSUPPORTED
+        if self.mode is not mode:
+            if not change_mode:
+                return Result.DENIED
+            if (result := self.set_mode(mode)) is not Result.ACCEPTED:
+                return result
+        self._steering.take_place(target)
+        return Result.ACCEPTED
+
+    def change_speed(self, cruise_m_s: float) -> Result:
+        """Fly to places with another speed over the ground."""
+        if not cruise_m_s > 0.0:
+            return Result.DENIED
+        if self.mode is not Mode.GUIDED and not self.personality.is_px4:
+            return Result.FAILED
+        self._steering.cruise_m_s = cruise_m_s
+        return Result.ACCEPTED
+
+    def turn(self, heading_rad: float) -> None:
+        """Turn to a heading and hold it, until the next set-point or mode."""
+        self._steering.turn_to_rad = heading_rad
+
+    @property
+    def throttle_stick(self) -> float:
+        """Where the pilot holds the throttle, -1 (down) to 1 (up)."""
+        return self._steering.throttle_stick
+
+    def move_throttle(self, stick: float, for_s: float = inf) -> None:
+        """Move the pilot's throttle stick: LOITER, POSHOLD and ALT_HOLD climb and sink with it.
+
+        Args:
+            stick: -1 (down) to 1 (up); 0 holds the height.
+            for_s: After so long it is in the middle again.
+        """
+        self._steering.throttle_stick = max(-1.0, min(1.0, stick))
+        self._stick_until_s = self.time_s + for_s
 
     def take_attitude(
         self, lean_rad: tuple[float, float], yaw_rad: float | None, thrust: float
@@ -337,12 +422,19 @@ class Flight:
     @property
     def target_m_s(self) -> tuple[float, float, float] | None:
         """North, east, down: the velocity that GUIDED follows, None in other modes."""
-        if self.mode is not Mode.GUIDED or self._steering.taking_off:
+        following = self.mode is Mode.GUIDED and self._steering.place is None
+        if not following or self._steering.taking_off:
             return None
         command = self._steering.target()
         if not self.personality.is_px4:
             command = self.fence.kept(command, self.position_m, self.time_s)
         return command.v_north_m_s, command.v_east_m_s, command.v_down_m_s
+
+    @property
+    def target_place_m(self) -> Vector | None:
+        """North, east, down from home: the place that is flown to, None without one."""
+        place = self._steering.place
+        return None if place is None else place.place_m
 
     def _watch_fence(self) -> None:
         """PX4 holds when the vehicle crosses a fence (its default action; not measured)."""
@@ -385,6 +477,8 @@ class Flight:
         self.mode = mode
         self._lost_offboard = False
         self.mode_changes += 1
+        self._steering.rtl_altitude_m = self.parameters.flown(RTL_ALTITUDE)
+        self._steering.cruise_m_s = self.parameters.flown(CRUISE_SPEED)
         self._steering.enter(mode, has_position=self.has_position)
 
     def _stop_motors(self) -> None:

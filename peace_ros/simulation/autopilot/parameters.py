@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from peace_ros.core.domain.parameters import ParameterSet, parameter
+from peace_ros.simulation.autopilot.datum import Datum
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,26 @@ class AutopilotParameters(ParameterSet):
         low=0.0,
         high=0.25,
     )
+    has_gimbal: bool = parameter(
+        False, 'A gimbal keeps the camera level with the horizon and reports its attitude.'
+    )
+    gimbal_pitch_deg: float = parameter(
+        -90.0,
+        'Its view above the horizon; -90 looks straight down.',
+        unit='deg',
+        low=-90.0,
+        high=0.0,
+    )
     rangefinder_max_m: float = parameter(
         0.0, 'Range of the downward rangefinder; 0: there is none.', unit='m', low=0.0, high=500.0
     )
+
+    @property
+    def datum(self) -> Datum:
+        """Where home lies on the globe."""
+        return Datum(
+            self.home_latitude_deg,
+            self.home_longitude_deg,
+            self.home_altitude_msl_m,
+            self.origin_above_home_m,
+        )

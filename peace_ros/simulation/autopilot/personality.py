@@ -21,6 +21,18 @@ SETPOINT_FRAMES_PX4 = frozenset({mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_
 OFFBOARD_LOSS_S = 1.05
 """Age of the newest set-point at which PX4 leaves OFFBOARD (measured, PX4 v1.17-alpha: 1.05 to
 1.1 s)."""
+DEVELOPMENT, ALPHA = mavlink.FIRMWARE_VERSION_TYPE_DEV, mavlink.FIRMWARE_VERSION_TYPE_ALPHA
+CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+    | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+)
 NEEDS_RADIO = frozenset({Mode.ALT_HOLD, Mode.LOITER, Mode.STABILIZE})
 """Modes of the sticks: PX4 without a radio refuses them over MAVLink and stays where it is
 (measured, PX4 v1.17-alpha)."""
@@ -75,7 +87,22 @@ class Personality:
     @property
     def banner(self) -> str:
         """The first STATUSTEXT."""
-        return f'{"PX4 v1.17" if self.is_px4 else "ArduCopter V4.7.0"} (peace_ros simulation)'
+        name = 'PX4 v1.17.0-alpha' if self.is_px4 else 'ArduCopter V4.7.0-dev'
+        return f'{name} (peace_ros simulation)'
+
+    @property
+    def version(self) -> int:
+        """flight_sw_version of AUTOPILOT_VERSION: major, minor, patch, type of the firmware."""
+        major, minor, patch, kind = (1, 17, 0, ALPHA) if self.is_px4 else (4, 7, 0, DEVELOPMENT)
+        return int(major << 24 | minor << 16 | patch << 8 | kind)
+
+    @property
+    def capabilities(self) -> int:
+        """MAV_PROTOCOL_CAPABILITY of what is served here."""
+        own = mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+        if self.is_px4:
+            own = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+        return int(CAPABILITIES | own)
 
     @property
     def refused(self) -> Result:

@@ -10,21 +10,49 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.simulation.autopilot.commands import Params, run_command, run_message
+from peace_ros.simulation.autopilot.commands import (
+    VehicleCommand,
+    read_command,
+    run_command,
+    run_message,
+)
 from peace_ros.simulation.autopilot.disturbance import BadLine, Disturbance
 from peace_ros.simulation.autopilot.flight import Flight
 from peace_ros.simulation.autopilot.lines import Address, Lines
+from peace_ros.simulation.autopilot.missions import Missions
 from peace_ros.simulation.autopilot.modes import Mode, Result, Severity
 from peace_ros.simulation.autopilot.parameters import AutopilotParameters
 from peace_ros.simulation.autopilot.personality import Personality
 from peace_ros.simulation.autopilot.signing import Signing
+from peace_ros.simulation.autopilot.stream_rates import PX4_UNASKED_HZ, members
 from peace_ros.simulation.autopilot.streams import Streams
 
 COMPONENT_ID = mavlink.MAV_COMP_ID_AUTOPILOT1
 HEARTBEAT_S = 1.0
 TIMESYNC_S = 10.0
 MAX_PEERS = 32
+REQUESTS: dict[int, int] = {
+    mavlink.MAV_CMD_REQUEST_MESSAGE: 0,
+    mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: 0,
+    mavlink.MAV_CMD_GET_HOME_POSITION: mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+    mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+}
+"""Commands that ask for a message; 0: their first parameter says which."""
 TEXT_BYTES = 50
+FTP_NAK, FTP_NO_FILE = 129, 10
+
+
+def no_file(message: Any) -> Any:
+    """Refuse a request of MAVLink FTP, so that clients ask by the other protocols at once.
+
+    The real ones have files, such as ``@PARAM/param.pck`` of ArduPilot.
+    """
+    request = bytes(message.payload)
+    sequence = (int.from_bytes(request[:2], 'little') + 1) % 65536
+    head = sequence.to_bytes(2, 'little') + bytes([request[2], FTP_NAK, 1, request[3], 0, 0])
+    payload = (head + bytes(4) + bytes([FTP_NO_FILE])).ljust(len(request), b'\0')
+    who = (0, message.get_srcSystem(), message.get_srcComponent())
+    return mavlink.MAVLink_file_transfer_protocol_message(*who, payload)
 
 
 @dataclass
@@ -54,19 +82,12 @@ class MavlinkServer:
         self._parameters = parameters
         self._personality = personality or Personality()
         self._disturbance = disturbance or Disturbance()
-        self._streams = Streams(parameters, self._personality, self._disturbance)
+        self._missions = Missions(self._personality, parameters.datum)
+        self._streams = Streams(parameters, self._personality, self._disturbance, self._missions)
+        unasked_hz = PX4_UNASKED_HZ if self._personality.is_px4 else {}
+        self._unasked_s = {each: 1.0 / hz for each, hz in unasked_hz.items()}
         self._signing = Signing(parameters.signing_key_file)
         self._peers: dict[Address, GroundStation] = {}
-        self._values: dict[str, float] = {
-            'GUID_TIMEOUT': 3.0,
-            'GUID_OPTIONS': 0.0,
-            'LAND_SPEED': 50.0,
-            'RTL_ALT': 1500.0,
-            'FRAME_CLASS': 1.0,
-            'SYSID_THISMAV': float(parameters.system_id),
-            'FS_THR_ENABLE': 1.0,
-            'FS_EKF_ACTION': 1.0,
-        }
         self._turn = 0
         self._text_id = 0
         self._seen = (0, 0)
@@ -104,8 +125,9 @@ class MavlinkServer:
         self._seen = (0, 0)
         self._heartbeat_due_s, self._timesync_due_s = 0.0, TIMESYNC_S
         for peer in self._peers.values():
-            peer.interval_s.clear()
-            peer.due_s.clear()
+            peer.interval_s = dict(self._unasked_s)
+            peer.due_s = dict.fromkeys(self._unasked_s, 0.0)
+        self._missions.forget_uploads()
 
     def wait(self, seconds: float) -> None:
         """Sleep until a datagram arrives, at most so long."""
@@ -139,6 +161,9 @@ class MavlinkServer:
         while self._peers and flight.texts:
             severity, text = flight.texts.popleft()
             self._tell_text(severity, text.encode('ascii', 'replace'))
+        for address, message in self._missions.due(flight.time_s):
+            if address in self._peers:
+                self._tell(self._peers[address], message)
         for peer in list(self._peers.values()):
             self._send_streams(flight, peer)
 
@@ -173,6 +198,8 @@ class MavlinkServer:
                 address,
                 BadLine(self._disturbance, 2 * self._turn),
                 BadLine(self._disturbance, 2 * self._turn + 1),
+                dict(self._unasked_s),
+                dict.fromkeys(self._unasked_s, 0.0),
             )
         self._turn += 1
         peer.turn = self._turn
@@ -192,28 +219,35 @@ class MavlinkServer:
                 now = max(1, self._clock_ns(flight))  # zero would be a question, not an answer
                 self._tell(peer, mavlink.MAVLink_timesync_message(now, message.ts1))
         elif kind.startswith('PARAM_'):
-            self._parameter(peer, message)
+            values, is_news = flight.parameters.take(message)
+            for value in values:
+                self._tell_all(value) if is_news else self._tell(peer, value)
+        elif kind.startswith('MISSION_'):
+            for answer in self._missions.take(peer.address, message, flight.time_s):
+                self._tell(peer, answer)
+        elif kind == 'REQUEST_DATA_STREAM':
+            self._request_stream(flight, peer, message)
+        elif kind == 'FILE_TRANSFER_PROTOCOL':
+            self._tell(peer, no_file(message))
         else:
             run_message(flight, message)
 
     def _command(self, flight: Flight, peer: GroundStation, m: Any) -> None:
-        if m.get_type() == 'COMMAND_INT':
-            p: Params = (m.param1, m.param2, m.param3, m.param4, float(m.x), float(m.y), m.z)
-        else:
-            p = (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7)
-        wanted: int | None = None
-        if self._refuses(flight, m.command, p):
+        command = read_command(m)
+        wanted: Any = None
+        if self._refuses(flight, command):
             if self._disturbance.refuse_silently:
                 return
             result = self._personality.refused
         elif m.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
-            result = self._set_interval(flight, peer, p)
-        elif m.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
-            known = isfinite(p[0]) and self._streams.knows(int(p[0]))
-            wanted = int(p[0]) if known else None
-            result = Result.ACCEPTED if known else Result.FAILED
+            result = self._set_interval(flight, peer, command)
+        elif m.command in REQUESTS:
+            wanted, result = self._requested(flight, peer, command)
+        elif m.command == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT:
+            chosen = isfinite(m.param1) and self._missions.choose(int(m.param1))
+            result = Result.ACCEPTED if chosen else Result.FAILED
         else:
-            result = run_command(flight, m.command, p)
+            result = run_command(flight, command)
         # MAVLink 2 extension fields say who asked.
         self._tell(
             peer,
@@ -221,15 +255,36 @@ class MavlinkServer:
                 m.command, int(result), 0, 0, m.get_srcSystem(), m.get_srcComponent()
             ),
         )
-        if wanted is not None:
-            self._tell(peer, self._streams.build(wanted, flight))
+        self._tell(peer, wanted)
 
-    def _refuses(self, flight: Flight, command: int, p: Params) -> bool:
+    def _requested(
+        self, flight: Flight, peer: GroundStation, command: VehicleCommand
+    ) -> tuple[Any, Result]:
+        """Return the message that a command asks for, and the answer to it."""
+        message_id = REQUESTS[command.number] or command.params[0]
+        if not isfinite(message_id) or not self._streams.knows(int(message_id)):
+            return None, Result.FAILED
+        if command.number == mavlink.MAV_CMD_GET_MESSAGE_INTERVAL:
+            interval_s = peer.interval_s.get(int(message_id))
+            interval_us = -1 if interval_s is None else round(interval_s * 1e6)
+            told = mavlink.MAVLink_message_interval_message(int(message_id), interval_us)
+            return told, Result.ACCEPTED
+        return self._streams.build(int(message_id), flight), Result.ACCEPTED
+
+    def _request_stream(self, flight: Flight, peer: GroundStation, m: Any) -> None:
+        """Take REQUEST_DATA_STREAM; PX4 knows none."""
+        if self._personality.is_px4:
+            return
+        interval_s = 1.0 / m.req_message_rate if m.start_stop and m.req_message_rate else -1.0
+        for message_id in members(m.req_stream_id):
+            self._set_rate(flight, peer, message_id, interval_s)
+
+    def _refuses(self, flight: Flight, command: VehicleCommand) -> bool:
         """Whether a fault refuses the mode that a command asks for."""
         refused = self._disturbance.refused_modes
-        if not refused or command != mavlink.MAV_CMD_DO_SET_MODE:
+        if not refused or command.number != mavlink.MAV_CMD_DO_SET_MODE:
             return False
-        number = self._personality.mode_of_command(p[1], p[2])
+        number = self._personality.mode_of_command(command.value(1), command.value(2))
         names = [self._personality.mode_name(mode) for mode in Mode if mode == number]
         if not refused.intersection(names):
             return False
@@ -243,39 +298,27 @@ class MavlinkServer:
         del self._peers[address]
         self._lines.hang_up(address)
 
-    def _set_interval(self, flight: Flight, peer: GroundStation, p: Params) -> Result:
-        if not (isfinite(p[0]) and isfinite(p[1])) or not self._streams.knows(int(p[0])):
+    def _set_interval(self, flight: Flight, peer: GroundStation, command: VehicleCommand) -> Result:
+        """Take SET_MESSAGE_INTERVAL: an interval of 0 asks for the default, -1 for none."""
+        message_id, interval_us = command.params[:2]
+        if not (isfinite(message_id) and isfinite(interval_us)):
             return Result.DENIED
-        message_id = int(p[0])
-        if p[1] <= 0.0:
-            peer.interval_s.pop(message_id, None)
-            return Result.ACCEPTED
-        peer.interval_s[message_id] = max(p[1] * 1e-6, 1.0 / self._parameters.physics_rate_hz)
-        peer.due_s[message_id] = flight.time_s
+        if not self._streams.knows(int(message_id)):
+            return Result.DENIED
+        by_default_s = self._unasked_s.get(int(message_id), -1.0)
+        interval_s = interval_us * 1e-6 if interval_us else by_default_s
+        self._set_rate(flight, peer, int(message_id), interval_s)
         return Result.ACCEPTED
 
-    def _parameter(self, peer: GroundStation, m: Any) -> None:
-        names = sorted(self._values)
-        kind = m.get_type()
-        if kind == 'PARAM_REQUEST_LIST':
-            wanted = names
-        elif kind == 'PARAM_REQUEST_READ' and m.param_index >= 0:
-            wanted = names[m.param_index : m.param_index + 1]
-        elif kind in {'PARAM_REQUEST_READ', 'PARAM_SET'}:
-            wanted = [name for name in names if name == m.param_id]
-            if kind == 'PARAM_SET' and wanted and isfinite(m.param_value):
-                self._values[m.param_id] = m.param_value
-        else:
-            return
-        for name in wanted:
-            value = mavlink.MAVLink_param_value_message(
-                name.encode(),
-                self._values[name],
-                mavlink.MAV_PARAM_TYPE_REAL32,
-                len(names),
-                names.index(name),
-            )
-            self._tell(peer, value)
+    def _set_rate(
+        self, flight: Flight, peer: GroundStation, message_id: int, interval_s: float
+    ) -> None:
+        if interval_s <= 0.0:
+            peer.interval_s.pop(message_id, None)
+        elif self._streams.knows(message_id):
+            shortest_s = 1.0 / self._parameters.physics_rate_hz
+            peer.interval_s[message_id] = max(interval_s, shortest_s)
+            peer.due_s[message_id] = flight.time_s
 
     def _tell_text(self, severity: int, raw: bytes) -> None:
         """Tell a STATUSTEXT, in numbered chunks when it is long."""

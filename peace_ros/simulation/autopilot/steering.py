@@ -10,10 +10,12 @@ from math import atan2, hypot
 
 import numpy as np
 
+from peace_ros.simulation.autopilot.datum import Vector
 from peace_ros.simulation.autopilot.guided import (
     GUID_TIMEOUT_S,
     STOP,
     GuidedVelocity,
+    PlaceTarget,
     PositionTarget,
     understand,
 )
@@ -25,12 +27,15 @@ TAKE_OFF_DONE_M = 0.1
 LAND_FAST_M_S = 1.5
 LAND_SLOW_M_S = 0.5
 LAND_SLOW_BELOW_M = 10.0
-RTL_ALTITUDE_M = 15.0
 RTL_SPEED_M_S = 5.0
 RTL_NEAR_M = 1.0
 LATERAL_BRAKING_M_S2 = 1.5
 VERTICAL_BRAKING_M_S2 = 1.0
 STANDING_M_S = 0.05
+CLIMB_SPEED_M_S = 2.5
+"""To a place, and of a full throttle stick (measured, ArduCopter 4.7-dev)."""
+TURNS_BEYOND_M = 5.0
+"""The nose turns to a place that is farther away."""
 FALLING = VelocityCommand(v_down_m_s=30.0, lean_rad=(0.0, 0.0))
 DOWN = VelocityCommand(v_down_m_s=LAND_SLOW_M_S)
 
@@ -51,6 +56,15 @@ class Steering:
         self._physics = physics
         self._holds_point = holds_point
         self.stick_yaw_rate_rad_s = 0.0
+        self.throttle_stick = 0.0
+        """-1 (down) to 1 (up); in the middle the height is held."""
+        self.cruise_m_s = 10.0
+        """Speed over the ground to a place."""
+        self.rtl_altitude_m = 15.0
+        self.place: PlaceTarget | None = None
+        """Where GUIDED, or AUTO.LOITER of PX4, flies to."""
+        self.turn_to_rad: float | None = None
+        """Heading that CONDITION_YAW asked for."""
         self._take_off_m: float | None = None
         self._spool_up_s = 0.0
         self._velocity = STOP
@@ -71,18 +85,17 @@ class Steering:
         return self._take_off_m is not None
 
     def landing(self, mode: Mode) -> bool:
-        """The mode is about to touch the ground by itself."""
-        return mode is Mode.LAND
+        """The mode is about to touch the ground by itself.
 
-    def wants_land(self, mode: Mode) -> bool:
-        """RTL has come home."""
-        return mode is Mode.RTL and self._home_reached
+        RTL stays RTL until the vehicle is disarmed (measured, ArduCopter 4.7-dev).
+        """
+        return mode is Mode.LAND or (mode is Mode.RTL and self._home_reached)
 
     def enter(self, mode: Mode, *, has_position: bool) -> None:
         """Forget what belonged to the mode before."""
         self._take_off_m = None
         self._velocity, self._attitude = STOP, None
-        self._hold = None
+        self._hold = self.place = self.turn_to_rad = None
         self._home_reached = False
         self._level_landing = mode is Mode.LAND and not has_position
 
@@ -97,8 +110,18 @@ class Steering:
         understood = understand(target, self._physics.yaw_rad)
         if understood is None:
             return
-        self._take_off_m = None
+        self._take_off_m = self.place = self.turn_to_rad = None
         self._velocity, self._velocity_age_s = understood, 0.0
+
+    def take_place(self, place: PlaceTarget) -> None:
+        """Fly to a place and stay there; a take-off ends."""
+        self._take_off_m = self._hold = self.turn_to_rad = None
+        self.place = place
+
+    def stop(self) -> None:
+        """Forget every target of GUIDED and hover."""
+        self._take_off_m = self.place = self.turn_to_rad = None
+        self._velocity = STOP
 
     def take_attitude(
         self, lean_rad: tuple[float, float], yaw_rad: float | None, thrust: float
@@ -109,9 +132,16 @@ class Steering:
         self._attitude_age_s = 0.0
 
     def command(
-        self, dt_s: float, mode: Mode, *, armed: bool, landed: bool, has_position: bool
+        self,
+        dt_s: float,
+        mode: Mode,
+        position_m: Vector,
+        *,
+        armed: bool,
+        landed: bool,
+        has_position: bool,
     ) -> VelocityCommand:
-        """Return what the mode asks of the physics in this step."""
+        """Return what the mode asks of the physics in this step; the position is estimated."""
         self._velocity_age_s += dt_s
         self._attitude_age_s += dt_s
         if not armed:
@@ -120,9 +150,11 @@ class Steering:
             return self._with_stick(self._climb_out(dt_s, self._take_off_m))
         if landed:
             return DOWN
-        return self._with_stick(self._of_mode(mode, has_position=has_position))
+        return self._with_stick(self._of_mode(mode, position_m, has_position=has_position))
 
-    def _of_mode(self, mode: Mode, *, has_position: bool) -> VelocityCommand:
+    def _of_mode(self, mode: Mode, position_m: Vector, *, has_position: bool) -> VelocityCommand:
+        if self.place is not None and mode in {Mode.GUIDED, Mode.BRAKE}:
+            return self._fly_to(self.place, position_m)
         if mode is Mode.GUIDED_NOGPS:
             fresh = self._attitude_age_s < GUID_TIMEOUT_S
             return self._attitude if self._attitude and fresh else _drift(0.0)
@@ -131,13 +163,13 @@ class Steering:
         with_position: dict[Mode, Callable[[], VelocityCommand]] = {
             Mode.GUIDED: self._guided,
             Mode.RTL: self._return_home,
-            Mode.LOITER: self._hold_point,
-            Mode.POSHOLD: self._hold_point,
+            Mode.LOITER: self._loiter,
+            Mode.POSHOLD: self._loiter,
             Mode.BRAKE: self._hold_point,
             Mode.TAKEOFF: self._hold_point,
         }
         steer = with_position.get(mode)
-        return steer() if steer is not None else _drift(0.0)
+        return steer() if steer is not None else _drift(self._stick_down_m_s)
 
     def _land(self, *, has_position: bool) -> VelocityCommand:
         speed = self._landing_speed_m_s()
@@ -155,7 +187,8 @@ class Steering:
         if self._velocity_age_s >= GUID_TIMEOUT_S:
             v = STOP
         if self._holds_point and v.v_north_m_s == v.v_east_m_s == v.v_down_m_s == 0.0:
-            return replace(self._hold_point(), yaw_rad=v.yaw_rad, yaw_rate_rad_s=v.yaw_rate_rad_s)
+            yaw_rad = v.yaw_rad if self.turn_to_rad is None else self.turn_to_rad
+            return replace(self._hold_point(), yaw_rad=yaw_rad, yaw_rate_rad_s=v.yaw_rate_rad_s)
         self._hold = None
         return VelocityCommand(
             v.v_north_m_s,
@@ -180,6 +213,31 @@ class Steering:
             approach_speed_m_s(down - down_m, 0.5, VERTICAL_BRAKING_M_S2),
         )
 
+    @property
+    def _stick_down_m_s(self) -> float:
+        return -CLIMB_SPEED_M_S * self.throttle_stick
+
+    def _loiter(self) -> VelocityCommand:
+        if self.throttle_stick == 0.0:
+            return self._hold_point()
+        self._hold = None
+        return VelocityCommand(v_down_m_s=self._stick_down_m_s)
+
+    def _fly_to(self, target: PlaceTarget, position_m: Vector) -> VelocityCommand:
+        north, east, down = (target.place_m[i] - position_m[i] for i in range(3))
+        away_m = hypot(north, east)
+        speed = approach_speed_m_s(away_m, self.cruise_m_s, LATERAL_BRAKING_M_S2)
+        share = speed / away_m if away_m > 0.0 else 0.0
+        yaw_rad = target.yaw_rad if self.turn_to_rad is None else self.turn_to_rad
+        if yaw_rad is None and away_m > TURNS_BEYOND_M:
+            yaw_rad = atan2(east, north)
+        return VelocityCommand(
+            share * north,
+            share * east,
+            approach_speed_m_s(down, CLIMB_SPEED_M_S, VERTICAL_BRAKING_M_S2),
+            yaw_rad=yaw_rad,
+        )
+
     def _climb_out(self, dt_s: float, altitude_m: float) -> VelocityCommand:
         if self._spool_up_s > 0.0:
             self._spool_up_s -= dt_s
@@ -201,7 +259,9 @@ class Steering:
     def _return_home(self) -> VelocityCommand:
         p = self._physics
         away = hypot(self._home[0] - p.north_m, self._home[1] - p.east_m)
-        missing = RTL_ALTITUDE_M + p.down_m
+        missing = self.rtl_altitude_m + p.down_m
+        if self._home_reached:
+            return replace(self._hold_point(), v_down_m_s=self._landing_speed_m_s())
         if away > RTL_NEAR_M and missing > 1.0:
             return VelocityCommand(
                 v_down_m_s=-approach_speed_m_s(missing + 0.5, 2.5, VERTICAL_BRAKING_M_S2)

@@ -5,29 +5,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, degrees, isfinite, nan, pi, radians
+from math import cos, degrees, isfinite, nan, pi, radians, sin
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain.geometry import quaternion_from_euler
+from peace_ros.simulation.autopilot import instruments
 from peace_ros.simulation.autopilot.disturbance import Disturbance, Vector
 from peace_ros.simulation.autopilot.estimator import READY_S
 from peace_ros.simulation.autopilot.flight import CRITICAL_BATTERY, LOW_BATTERY, Flight
+from peace_ros.simulation.autopilot.guided import ALL_BUT_POSITION
+from peace_ros.simulation.autopilot.missions import Missions
 from peace_ros.simulation.autopilot.modes import LandedState
 from peace_ros.simulation.autopilot.parameters import AutopilotParameters
 from peace_ros.simulation.autopilot.personality import EKF_STATUS, Personality
-from peace_ros.simulation.autopilot.physics import GRAVITY_M_S2
 
-METRES_PER_DEGREE = 111_319.49
 UNKNOWN_U16 = 65535
-INERTIAL_FIELDS = 0x3F
-"""Fields of HIGHRES_IMU that are new: acceleration and body rates."""
+MAX_E7 = 2**31 - 1
 VELOCITY_ONLY = 0xDC7
 """Type mask of POSITION_TARGET_LOCAL_NED: only the velocity counts."""
 SENSORS = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
     | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
     | mavlink.MAV_SYS_STATUS_SENSOR_GPS
     | mavlink.MAV_SYS_STATUS_AHRS
     | mavlink.MAV_SYS_STATUS_PREARM_CHECK
@@ -42,10 +45,13 @@ class Streams:
         parameters: AutopilotParameters,
         personality: Personality | None = None,
         disturbance: Disturbance | None = None,
+        missions: Missions | None = None,
     ) -> None:
         self._parameters = parameters
+        self._datum = parameters.datum
         self._disturbance = disturbance or Disturbance()
         self._personality = personality or Personality()
+        self._missions = missions or Missions(self._personality, self._datum)
         estimator = self._personality.estimator_message
         self._builders: dict[int, Callable[[Flight], Any]] = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
@@ -62,13 +68,21 @@ class Streams:
             mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
             mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: self._position_target,
+            mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: self._gimbal,
+            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: self._global_target,
+            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
+            mavlink.MAVLINK_MSG_ID_VFR_HUD: instruments.vfr_hud,
+            mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: instruments.scaled_pressure,
+            mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: instruments.system_time,
+            mavlink.MAVLINK_MSG_ID_RC_CHANNELS: instruments.rc_channels,
+            mavlink.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: instruments.nav_controller_output,
             estimator: ekf_status if estimator == EKF_STATUS else estimator_status,
         }
         if self._personality.is_px4:
             self._builders[mavlink.MAVLINK_MSG_ID_ALTITUDE] = self._altitude
-            self._builders[mavlink.MAVLINK_MSG_ID_HIGHRES_IMU] = self._highres_imu
+            self._builders[mavlink.MAVLINK_MSG_ID_HIGHRES_IMU] = instruments.highres_imu
         else:
-            self._builders[mavlink.MAVLINK_MSG_ID_RAW_IMU] = self._raw_imu
+            self._builders[mavlink.MAVLINK_MSG_ID_RAW_IMU] = instruments.raw_imu
             self._builders[mavlink.MAVLINK_MSG_ID_FENCE_STATUS] = lambda flight: (
                 flight.fence.status(flight.position_m, flight.time_s)
             )
@@ -86,7 +100,7 @@ class Streams:
         if flight.home_changes == 0:
             return None
         north, east, down = flight.home_m
-        latitude, longitude = self._geodetic(north, east)
+        latitude, longitude = self._datum.geodetic_e7(north, east)
         # ArduPilot fills in where home is on the globe only; its local position says nothing.
         local = (0.0, 0.0, 0.0)
         if self._personality.is_px4:
@@ -103,13 +117,6 @@ class Streams:
             round(flight.time_s * 1e6),
         )
 
-    def _geodetic(self, north_m: float, east_m: float) -> tuple[int, int]:
-        p = self._parameters
-        latitude = p.home_latitude_deg + north_m / METRES_PER_DEGREE
-        shrink = cos(radians(p.home_latitude_deg))
-        longitude = p.home_longitude_deg + east_m / (METRES_PER_DEGREE * shrink)
-        return round(latitude * 1e7), round(longitude * 1e7)
-
     def _reported(self, flight: Flight, at_m: Vector | None = None) -> tuple[Vector, Vector]:
         d = self._disturbance
         position_m = flight.position_m if at_m is None else at_m
@@ -120,9 +127,6 @@ class Streams:
 
     def _boot_ms(self, flight: Flight) -> int:
         return round((flight.time_s + self._disturbance.clock_step_s) * 1000.0) & 0xFFFFFFFF
-
-    def _boot_us(self, flight: Flight) -> int:
-        return round((flight.time_s + self._disturbance.clock_step_s) * 1e6)
 
     def _local_position_ned(self, flight: Flight) -> Any:
         if not flight.estimator.reports_position(flight.time_s):
@@ -137,7 +141,7 @@ class Streams:
         if not flight.estimator.has_origin(flight.time_s):
             return None
         p = self._parameters
-        latitude, longitude = self._geodetic(0.0, 0.0)
+        latitude, longitude = self._datum.geodetic_e7(0.0, 0.0)
         altitude_m = p.home_altitude_msl_m + p.origin_above_home_m
         return mavlink.MAVLink_gps_global_origin_message(
             latitude, longitude, round(altitude_m * 1000), round(flight.time_s * 1e6)
@@ -164,21 +168,6 @@ class Streams:
             self._boot_ms(flight), *attitude, *flight.physics.body_rates_rad_s
         )
 
-    def _raw_imu(self, flight: Flight) -> Any:
-        """Return RAW_IMU in the units in which ArduPilot sends it: mG and mrad/s."""
-        force = [each / GRAVITY_M_S2 * 1000.0 for each in flight.physics.specific_force_m_s2]
-        rates = [each * 1000.0 for each in flight.physics.body_rates_rad_s]
-        whole = [max(-32768, min(32767, round(each))) for each in (*force, *rates)]
-        return mavlink.MAVLink_raw_imu_message(self._boot_us(flight), *whole, 0, 0, 0)
-
-    def _highres_imu(self, flight: Flight) -> Any:
-        """Return HIGHRES_IMU with acceleration and body rates only."""
-        p = flight.physics
-        measured = (*p.specific_force_m_s2, *p.body_rates_rad_s)
-        return mavlink.MAVLink_highres_imu_message(
-            self._boot_us(flight), *measured, *(0.0,) * 7, INERTIAL_FIELDS
-        )
-
     def _global_position_int(self, flight: Flight) -> Any:
         known = flight.estimator.reports_position(flight.time_s)
         if not known and self._personality.is_px4:
@@ -188,7 +177,7 @@ class Streams:
         (north, east, down), (v_north, v_east, v_down) = self._reported(flight, at_m)
         if not isfinite(down):
             return None  # whole millimetres cannot say that
-        latitude, longitude = self._geodetic(north, east)
+        latitude, longitude = self._datum.geodetic_e7(north, east)
         return mavlink.MAVLink_global_position_int_message(
             self._boot_ms(flight),
             latitude,
@@ -203,18 +192,42 @@ class Streams:
 
     def _position_target(self, flight: Flight) -> Any:
         """Return POSITION_TARGET_LOCAL_NED: what GUIDED follows, whoever sent it."""
-        target_m_s = flight.target_m_s
-        if target_m_s is None:
+        target_m_s, target_m, mask = flight.target_m_s, flight.target_place_m, VELOCITY_ONLY
+        if target_m is not None:
+            north, east, down = target_m
+            target_m = north, east, down + self._parameters.origin_above_home_m
+            mask = ALL_BUT_POSITION
+        elif target_m_s is None:
             return None
-        frame, place = mavlink.MAV_FRAME_LOCAL_NED, (0.0,) * 3
+        frame, nothing = mavlink.MAV_FRAME_LOCAL_NED, (0.0,) * 3
+        values = (*(target_m or nothing), *(target_m_s or nothing), *(0.0,) * 5)
         return mavlink.MAVLink_position_target_local_ned_message(
-            self._boot_ms(flight), frame, VELOCITY_ONLY, *place, *target_m_s, *(0.0,) * 5
+            self._boot_ms(flight), frame, mask, *values
+        )
+
+    def _global_target(self, flight: Flight) -> Any:
+        """Return POSITION_TARGET_GLOBAL_INT: the place that is flown to, None without one."""
+        if flight.target_place_m is None:
+            return None
+        north, east, down = flight.target_place_m
+        latitude, longitude = self._datum.geodetic_e7(north, east)
+        if max(abs(latitude), abs(longitude)) > MAX_E7:
+            return None  # a place far beyond the plane around home has no longitude
+        altitude_m = self._datum.altitude_msl_m - down
+        where = (mavlink.MAV_FRAME_GLOBAL_INT, ALL_BUT_POSITION, latitude, longitude, altitude_m)
+        return mavlink.MAVLink_position_target_global_int_message(
+            self._boot_ms(flight), *where, *(0.0,) * 8
+        )
+
+    def _mission_current(self, _flight: Flight) -> Any:
+        return mavlink.MAVLink_mission_current_message(
+            self._missions.current, self._missions.count()
         )
 
     def _gps_raw_int(self, flight: Flight) -> Any:
         physics = flight.physics
         fix = flight.estimator.gps and flight.time_s >= READY_S / 4
-        latitude, longitude = self._geodetic(physics.north_m, physics.east_m)
+        latitude, longitude = self._datum.geodetic_e7(physics.north_m, physics.east_m)
         altitude_m = self._parameters.home_altitude_msl_m - physics.down_m + flight.gnss.error_m
         return mavlink.MAVLink_gps_raw_int_message(
             round(flight.time_s * 1e6),
@@ -247,6 +260,23 @@ class Streams:
             255,
         )
 
+    def _gimbal(self, flight: Flight) -> Any:
+        """Return GIMBAL_DEVICE_ATTITUDE_STATUS: level in roll, turned with the vehicle."""
+        if not self._parameters.has_gimbal:
+            return None
+        half_rad = radians(self._parameters.gimbal_pitch_deg) / 2.0
+        flags = (
+            mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK
+            | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
+            | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
+        )
+        quaternion = [cos(half_rad), 0.0, sin(half_rad), 0.0]
+        yaw_rad = flight.physics.yaw_rad
+        boot_ms = self._boot_ms(flight)
+        return mavlink.MAVLink_gimbal_device_attitude_status_message(
+            0, 0, boot_ms, flags, quaternion, 0.0, 0.0, 0.0, 0, yaw_rad, 0.0, 1
+        )
+
 
 def heartbeat(flight: Flight) -> Any:
     """Return HEARTBEAT of a quadrotor."""
@@ -276,6 +306,8 @@ def sys_status(flight: Flight) -> Any:
     health = SENSORS
     if flight.prearm_problem():
         health &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    if flight.fence.room_m(flight.position_m) >= 0.0:
+        health |= mavlink.MAV_SYS_STATUS_GEOFENCE
     if not flight.estimator.gps:
         health &= ~mavlink.MAV_SYS_STATUS_SENSOR_GPS
     return mavlink.MAVLink_sys_status_message(
@@ -342,15 +374,9 @@ def estimator_status(flight: Flight) -> Any:
     )
 
 
-def autopilot_version(_flight: Flight) -> Any:
-    """Return AUTOPILOT_VERSION: 4.7.0, MAVLink 2, velocity set-points."""
-    capabilities = (
-        mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-        | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-        | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
-        | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
-    )
-    version = (4 << 24) | (7 << 16) | (0 << 8) | 255
+def autopilot_version(flight: Flight) -> Any:
+    """Return AUTOPILOT_VERSION: firmware and what this server serves."""
+    capabilities, version = flight.personality.capabilities, flight.personality.version
     empty = [0] * 8
     return mavlink.MAVLink_autopilot_version_message(
         capabilities, version, 0, 0, 0, empty, empty, empty, 0, 0, 0

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from peace_ros.core.domain import ConfigurationError, WorldError
-from peace_ros.simulation.rasters import check_size
+from peace_ros.simulation.picture_files import check_size
 from peace_ros.simulation.tiles.mercator import (
     EQUATOR_M,
     TILE_PX,

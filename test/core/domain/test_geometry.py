@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 
 from peace_ros.core.domain import NADIR, Camera, Pose
 from peace_ros.core.domain.geometry import (
+    angle_between,
     attitude_enu_flu_to_ned_frd,
     attitude_ned_frd_to_enu_flu,
     camera_pose,
+    camera_pose_on_gimbal,
     enu_to_ned,
     footprint_m,
     ground_to_image,
@@ -22,6 +24,7 @@ from peace_ros.core.domain.geometry import (
     mount_from_degrees,
     mount_from_optical,
     ned_to_enu,
+    optical_from_mount,
     quaternion_from_euler,
     quaternion_from_rotation_vector,
     rotation_matrix,
@@ -175,6 +178,39 @@ def test_the_place_of_the_camera_turns_with_the_vehicle() -> None:
     east = camera_pose(mount, pose(yaw=radians(90)))
     assert (east.north_m, east.east_m) == pytest.approx((-1.0, 2.0))
     assert (east.down_m, east.altitude_agl_m) == pytest.approx((-99.5, 99.5))
+
+
+@pytest.mark.parametrize('in_earth', [False, True])
+def test_a_camera_on_a_gimbal_looks_where_the_gimbal_points_however_the_vehicle_leans(
+    in_earth: bool,
+) -> None:
+    leaning = pose(roll=0.2, pitch=-0.3, yaw=radians(90))
+    turned = quaternion_from_euler(0.0, radians(-75.0), radians(90) if in_earth else 0.0)
+    seen = centre_looks_at(camera_pose_on_gimbal(NADIR, leaning, turned, in_earth=in_earth))
+    assert seen == pytest.approx((0.0, 100 * tan(radians(15))), abs=1e-6)
+
+
+def test_a_gimbal_that_points_down_is_a_nadir_camera() -> None:
+    down = quaternion_from_euler(0.0, radians(-90.0), 0.0)
+    placed = camera_pose_on_gimbal(NADIR, pose(yaw=0.7), down, in_earth=False)
+    assert pixel_of(12.0, -5.0, placed) == pytest.approx(pixel_of(12.0, -5.0, pose(yaw=0.7)))
+
+
+def test_a_camera_is_turned_on_its_gimbal_and_its_place_is_on_the_vehicle() -> None:
+    mount = mount_from_degrees((0.0, 15.0, 0.0), (2.0, 0.0, 0.5))
+    down = quaternion_from_euler(0.0, radians(-90.0), 0.0)
+    placed = camera_pose_on_gimbal(mount, pose(), down, in_earth=False)
+    assert (placed.north_m, placed.down_m) == pytest.approx((2.0, -99.5))
+    north, east = centre_looks_at(placed)
+    assert (north, east) == pytest.approx((2.0 + 99.5 * tan(radians(15)), 0.0), abs=1e-6)
+
+
+def test_a_mount_survives_the_way_to_its_optical_frame_and_back() -> None:
+    for turns in ((0.0, 0.0, 0.0), (10.0, -20.0, 130.0)):
+        mount = mount_from_degrees(turns, (0.5, -0.2, 0.1))
+        back = mount_from_optical(*optical_from_mount(mount))
+        assert angle_between(back.quaternion, mount.quaternion) < 1e-6
+        assert back.offset_frd_m == pytest.approx(mount.offset_frd_m)
 
 
 def test_the_mount_by_parameters_and_by_an_optical_frame_are_the_same() -> None:

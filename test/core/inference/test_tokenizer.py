@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from peace_ros.core.domain import BundleError, ConfigurationError
+from peace_ros.core.inference import Bundle
 from peace_ros.core.inference.tokenizer import Tokenizer
 
 
@@ -47,6 +48,14 @@ def test_a_text_that_just_fits_is_not_warned_of(
 def test_unknown_words_are_named_as_written(tokenizer: Tokenizer) -> None:
     assert tokenizer.unknown_words('a photo of Quicksand, grass') == ('Quicksand',)
     assert tokenizer.unknown_words('a photo of grass') == ()
+
+
+def test_words_of_a_script_that_leaves_no_token_are_unknown() -> None:
+    bundle = Bundle.load('clipseg-small')
+    bundled = Tokenizer(bundle.paths['tokenizer'], bundle.manifest.context_length)
+    assert bundled.unknown_words('草地') == ('草地',)
+    assert bundled.unknown_words('a photo of 草地, grass') == ('草地',)
+    assert bundled.unknown_words('a photo of grass, a road') == ()
 
 
 @pytest.mark.parametrize('texts', [[], ['grass', ' '], ['']])

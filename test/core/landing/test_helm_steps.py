@@ -206,6 +206,13 @@ def test_the_lowest_height_decides_on_hand_over_and_the_end_of_aiming() -> None:
     assert steps.step(pose_of(57.9), site_at(), heights=above).state is State.LANDING
 
 
+def test_a_climb_ends_where_the_lowest_height_is_safe() -> None:
+    steps = Steps(state=State.CLIMBING)
+    above = HeightSight(above_lowest_m=5.0)
+    assert steps.step(pose_of(53.9), heights=above).state is State.CLIMBING
+    assert steps.step(pose_of(54.0), heights=above).state is State.RESTARTING
+
+
 def test_a_takeover_aborts_for_good() -> None:
     steps = Steps(state=State.LANDING)
     steps.step(pose_of(30.0), site_at())

@@ -8,7 +8,7 @@ from math import nan, radians
 import numpy as np
 import pytest
 
-from peace_ros.core.domain import NADIR, Camera, DepthImage, Frame, Heatmap, Mount, Pose
+from peace_ros.core.domain import Camera, DepthImage, Frame, Heatmap, Pose
 from peace_ros.core.domain.geometry import mount_from_degrees, quaternion_from_euler
 from peace_ros.core.landing import LandingParameters, odometry, picture_height
 from peace_ros.core.landing.intake import HeatmapIntake
@@ -289,18 +289,6 @@ def test_after_calibrated_frames_one_without_calibration_is_not_used(intake, saf
     assert 'camera_info is missing' in intake.last_rejection
 
 
-def test_nothing_is_used_until_the_mount_of_the_camera_is_known(safety_map):
-    intake = HeatmapIntake(LandingParameters(), CAMERA, safety_map, None)
-    intake.add_pose(pose_of(1.0))
-    intake.add_heatmap(heatmap_of(1.0))
-    assert safety_map.stamp_ns is None
-    assert 'mounted' in intake.last_rejection
-    intake.place_camera(NADIR)
-    intake.add_pose(pose_of(1.1))
-    intake.add_heatmap(heatmap_of(1.1))
-    assert safety_map.stamp_ns == round(1.1 * S)
-
-
 def test_a_camera_that_looks_ahead_sees_what_is_ahead(safety_map):
     mount = mount_from_degrees((0.0, 15.0, 0.0), (0.0, 0.0, 0.0))
     intake = HeatmapIntake(LandingParameters(), CAMERA, safety_map, mount)
@@ -313,12 +301,15 @@ def test_a_camera_that_looks_ahead_sees_what_is_ahead(safety_map):
     assert east == pytest.approx(0.0, abs=0.3)
 
 
-def test_another_mount_drops_the_map(intake, safety_map):
-    intake.place_camera(NADIR)
-    assert safety_map.stamp_ns is not None
-    intake.place_camera(Mount(offset_frd_m=(0.5, 0.0, 0.0)))
-    assert safety_map.stamp_ns is None
-    assert intake.last_rejection == 'the camera is mounted otherwise, so the map was dropped'
+def test_a_mount_that_moves_counts_at_its_own_pose(safety_map):
+    intake = HeatmapIntake(LandingParameters(), CAMERA, safety_map)
+    for tick in range(1, 5):
+        ahead = mount_from_degrees((0.0, 5.0 * tick, 0.0), (0.0, 0.0, 0.0))
+        intake.add_pose(pose_of(0.1 * tick), ahead)
+    intake.add_heatmap(heatmap_of(0.3))
+    layers = safety_map.layers(round(0.4 * S))
+    north, _ = layers.centre_of(*np.argwhere(layers.looks).mean(axis=0))
+    assert north > 10.0
 
 
 def test_pictures_and_depth_of_another_shape_are_counted_and_not_used(intake):
@@ -327,6 +318,23 @@ def test_pictures_and_depth_of_another_shape_are_counted_and_not_used(intake):
     intake.add_depth(DepthImage(np.full((36, 64), 9.0, np.float32), round(2.0 * S)))
     assert intake.counts['picture of another shape than the frames'] == 2
     assert intake.counts['depth of another shape than the frames'] == 1
+
+
+def test_inputs_of_unknown_sources_are_not_used_and_those_of_before_dropped(intake, safety_map):
+    intake.distrust('two of them')
+    assert safety_map.stamp_ns is None
+    assert intake.drops == 1
+    for tick in (21, 22):
+        intake.add_pose(pose_of(0.1 * tick))
+        intake.add_heatmap(heatmap_of(0.1 * tick))
+    assert safety_map.stamp_ns is None
+    assert intake.counts['two of them'] == 2
+    intake.distrust('')
+    for tick in (23, 24):
+        intake.add_pose(pose_of(0.1 * tick))
+        intake.add_heatmap(heatmap_of(0.1 * tick))
+    assert safety_map.stamp_ns == round(2.4 * S)
+    assert intake.last_rejection == 'two of them'
 
 
 def test_reasons_without_end_do_not_fill_the_memory(intake):

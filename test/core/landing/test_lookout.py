@@ -370,3 +370,5 @@ def test_low_down_a_site_is_reachable_within_its_clearance(painted, pose, east_m
     assert lookout.reachable(pose) is (site if is_reachable else None)
     seen = look(lookout, painted, State.AIMING, pose, is_new=False)
     assert seen.reachable is (site if is_reachable else None)
+    if pose is HIGH:
+        assert lookout.reachable(pose, HIGH.altitude_agl_m - 48.9) is None, 'it may be lower'

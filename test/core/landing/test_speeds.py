@@ -246,8 +246,20 @@ def test_beyond_its_radius_a_square_begins_anew() -> None:
     assert just.target(pose_of(60.0)) == (57.0, 8.0)
 
 
+def test_the_way_of_a_square_is_known_before_it_is_flown() -> None:
+    square = ExpandingSquare((0.0, 0.0), 30.0, 43.0)
+    assert square.way == ((0.0, 0.0), (30.0, 0.0), (30.0, 30.0), (-30.0, 30.0), (-30.0, -30.0))
+    assert ExpandingSquare((7.0, 8.0), 50.0, 49.0).way == ((7.0, 8.0),)
+
+
 def test_a_descent_ends_where_the_lowest_height_does() -> None:
     site = site_at(0.0, 0.0)
     alone, _ = flown(State.LANDING, 21.0, site)
     assert flown(State.LANDING, 25.0, site, above_lowest_m=4.0)[0] == pytest.approx(alone)
     assert flown(State.LANDING, 25.0, site, above_lowest_m=5.0)[0] == (0.0, 0.0, 0.0)
+
+
+def test_sideways_counts_the_lowest_height_that_is_believed() -> None:
+    far = site_at(40.0, 0.0)
+    assert flown(State.AIMING, 60.0, far, above_lowest_m=11.0)[0][0] > 1.0
+    assert flown(State.AIMING, 60.0, far, above_lowest_m=11.1)[0] == (0.0, 0.0, 0.0)

@@ -52,6 +52,12 @@ def test_the_safe_altitude_is_reached_at_98_percent_of_it(altitude_m, is_safe):
     assert at_safe_altitude(None, P) is False
 
 
+@pytest.mark.parametrize(('above_lowest_m', 'is_safe'), [(0.0, True), (10.0, True), (12.0, False)])
+def test_the_safe_altitude_counts_from_the_lowest_height_that_is_believed(above_lowest_m, is_safe):
+    pose = replace(POSE, altitude_agl_m=60.0)
+    assert at_safe_altitude(pose, P, above_lowest_m) is is_safe
+
+
 @pytest.mark.parametrize(
     ('changes', 'age_s', 'sentence'),
     [

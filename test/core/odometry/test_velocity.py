@@ -5,14 +5,14 @@
 import numpy as np
 import pytest
 
-from peace_ros.core.odometry.velocity import Track
+from peace_ros.core.odometry.velocity import PositionTrack
 
 NS = 1_000_000_000
 VARIANCE = np.array([0.01, 0.04, 0.09])
 
 
 def track_of(times_s, velocity=(1.0, -2.0, 0.5), noise=0.0):
-    track, random = Track(0.4), np.random.default_rng(1)
+    track, random = PositionTrack(0.4), np.random.default_rng(1)
     for time_s in times_s:
         position = time_s * np.array(velocity) + random.normal(0.0, 1.0, 3) * noise
         track.add(round((7.0 + time_s) * NS), position, VARIANCE)
@@ -42,7 +42,7 @@ def test_five_frames_a_second_are_enough():
 def test_the_variance_is_that_of_many_trials():
     slopes = []
     for seed in range(400):
-        track, random = Track(0.4), np.random.default_rng(seed)
+        track, random = PositionTrack(0.4), np.random.default_rng(seed)
         for step in range(5):
             track.add(step * NS // 10, random.normal(0.0, np.sqrt(VARIANCE)), VARIANCE)
         slopes.append(track.velocity().mean_m_s)

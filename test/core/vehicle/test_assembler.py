@@ -259,6 +259,12 @@ def range_message(distance_cm, orientation=25):
     return mavlink.MAVLink_distance_sensor_message(0, 20, 4000, distance_cm, 0, 0, orientation, 255)
 
 
+def take_twice(assembler, message):
+    """A first message that no other one confirms is not used."""
+    for _ in range(2):
+        assembler.take(message, 0, 0)
+
+
 @pytest.mark.parametrize(
     ('message', 'altitude_m'),
     [
@@ -270,7 +276,7 @@ def range_message(distance_cm, orientation=25):
 )
 def test_the_rangefinder_counts_downward_and_in_range(message, altitude_m):
     assembler = Assembler(ArduPilot(), VehicleParameters(altitude_source='rangefinder'))
-    assembler.take(message, 0, 0)
+    take_twice(assembler, message)
     assembler.take(position(), 0, 0)
     assembler.take(attitude(roll=radians(20)), 0, 0)
     assert assembler.telemetry(0).pose.altitude_agl_m == pytest.approx(altitude_m)
@@ -299,7 +305,7 @@ def terrain(height_m, spacing=100):
 def test_other_heights_are_reported_while_they_are_fresh(
     assembler, message, source, height_m, error_m
 ):
-    assembler.take(message, 0, 0)
+    take_twice(assembler, message)
     for second in (0, 1, 2, 3):
         assembler.take(position(1000 + 1000 * second), 0, second * SECOND)
         assembler.take(attitude(1000 + 1000 * second, roll=radians(20)), 0, second * SECOND)
@@ -320,17 +326,17 @@ def test_other_heights_are_reported_while_they_are_fresh(
         (range_message(3900), range_message(4100), 0),
         (None, range_message(900, 0), 0),
         (None, terrain(33.0, spacing=0), 0),
-        (None, terrain(nan), 1),
-        (None, fix(3e5), 1),
+        (None, terrain(nan), 2),
+        (None, fix(3e5), 2),
     ],
 )
 def test_what_is_no_height_is_not_reported(assembler, good, bad, rejected):
     assembler.take(position(), 0, 0)
     assembler.take(attitude(), 0, 0)
     if good is not None:
-        assembler.take(good, 0, 0)
+        take_twice(assembler, good)
         assert assembler.telemetry(0).heights
-    assembler.take(bad, 0, 0)
+    take_twice(assembler, bad)
     assert not assembler.telemetry(0).heights
     assert assembler.rejected == rejected
 
@@ -338,11 +344,46 @@ def test_what_is_no_height_is_not_reported(assembler, good, bad, rejected):
 def test_a_single_message_moves_no_other_height(assembler):
     assembler.take(position(), 0, 0)
     assembler.take(attitude(), 0, 0)
+    take_twice(assembler, fix(615.0))
     told = []
     for altitude_m in (615.0, 700.0, 616.0, 616.0, 640.0, 640.0):
         assembler.take(fix(altitude_m), 0, 0)
         told.append(assembler.telemetry(0).heights[0].height_m)
     assert told == [615.0, 615.0, 615.0, 616.0, 616.0, 640.0]
+
+
+@pytest.mark.parametrize(('roll_deg', 'count'), [(55, 1), (65, 0), (172, 0)])
+def test_a_rangefinder_that_looks_aside_says_nothing(assembler, roll_deg, count):
+    assembler.take(position(), 0, 0)
+    assembler.take(attitude(roll=radians(roll_deg)), 0, 0)
+    take_twice(assembler, range_message(2500))
+    assert len(assembler.telemetry(0).heights) == count
+
+
+def test_a_time_stamp_that_is_ahead_leads_a_position_no_farther(assembler):
+    """At 3 m/s, 990 ms ahead, 5 m beside where that leads: 7.9 m beside the vehicle."""
+    for tick in range(5):
+        assembler.take(position(1000 + 50 * tick, x=0.15 * tick, vx=3.0), 0, tick * SECOND // 20)
+    at_ns = 5 * SECOND // 20
+    forged = position(1200 + 990, x=0.6 + 2.97 + 4.9, vx=3.0)
+    assembler.take(forged, 0, at_ns)
+    assembler.take(attitude(1210), 0, at_ns)
+    assert assembler.telemetry(at_ns).pose.north_m == pytest.approx(0.6, abs=0.2)
+
+
+@pytest.mark.parametrize('message', [fix(615.0), terrain(33.0), range_message(2500)])
+def test_the_first_message_of_a_height_is_not_used_alone(message):
+    """A vehicle without a rangefinder gets its first distance from a forger."""
+    assembler = Assembler(ArduPilot(), VehicleParameters(altitude_source='rangefinder'))
+    assembler.take(position(), 0, 0)
+    assembler.take(attitude(), 0, 0)
+    barometer_m = assembler.telemetry(0).pose.altitude_agl_m
+    assembler.take(message, 0, 0)
+    told = assembler.telemetry(0)
+    assert told.heights == ()
+    assert told.pose.altitude_agl_m == barometer_m
+    assembler.take(message, 0, 0)
+    assert len(assembler.telemetry(0).heights) == 1
 
 
 def test_long_texts_are_put_together(assembler):

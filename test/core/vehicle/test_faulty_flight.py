@@ -80,11 +80,53 @@ def test_a_ground_station_that_takes_over_has_the_last_word(sent, eventually, mo
     asking.join()
     assert link.taken_over
     assert not link.request_control()
-    assert sim.mode_name in {mode, 'LAND'}, 'RTL lands at home'
+    assert sim.mode_name == mode
     assert station.set_mode('GUIDED')
     assert eventually(lambda: link.telemetry().in_control)
     assert heard_within(0.5) == 0.0, 'given back is not engaged'
     station.close()
+
+
+def test_a_landing_that_was_asked_for_is_not_asked_again_after_a_pilot_took_over(
+    flying, eventually
+):
+    sim, link = flying
+    inject(sim, 'refuse', modes=['LAND'], silently=True)
+    results = []
+    asking = threading.Thread(target=lambda: results.append(link.request_land()))
+    asking.start()
+    time.sleep(0.2)
+    sim.pilot_mode('LOITER')
+    assert eventually(lambda: link.taken_over, 2.0)
+    inject(sim, 'refuse', modes=[])
+    asking.join(1.0)
+    assert not asking.is_alive(), 'it does not wait for an answer any more'
+    assert not results[0]
+    assert 'withdrawn' in results[0].reason
+    time.sleep(1.0)
+    assert sim.mode_name == 'LOITER', 'the pilot has the last word'
+
+
+def test_a_landing_that_was_withdrawn_is_not_asked_again(flying):
+    sim, link = flying
+    inject(sim, 'refuse', modes=['LAND'], silently=True)
+    withdrawn = threading.Event()
+    asking = threading.Thread(target=link.request_land, args=(lambda: not withdrawn.is_set(),))
+    asking.start()
+    time.sleep(0.2)
+    withdrawn.set()
+    inject(sim, 'refuse', modes=[])
+    asking.join(1.0)
+    assert not asking.is_alive()
+    time.sleep(1.0)
+    assert sim.mode_name == 'GUIDED'
+
+
+def test_a_mode_that_is_reached_counts_although_the_answer_was_lost(flying):
+    sim, link = flying
+    inject(sim, 'telemetry_stop', messages=['COMMAND_ACK'])
+    assert link.request_land()
+    assert sim.mode_name == 'LAND'
 
 
 def test_a_reboot_in_flight_is_a_takeover(flying, eventually):

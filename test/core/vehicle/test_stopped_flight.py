@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A flying vehicle that something stops: the link names it, and the position is not accused."""
 
+import socket
+import threading
 import time
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from peace_ros.core.domain import Setpoint
 from peace_ros.core.vehicle import SetpointSender, open_vehicle
@@ -91,6 +94,31 @@ def test_a_second_commander_is_named_while_it_commands_and_accuses_no_position(f
     inject(sim, 'commander', rate_hz=0.0)
     told = fly(Setpoint(0), 6.0, until=lambda each: not each.other_commander)
     assert told[-1].other_commander == ''
+
+
+def test_a_second_commander_that_sends_places_is_named(flown):
+    sim, _, fly = flown
+    told = fly(Setpoint(0, v_north_m_s=1.0), 2.0)
+    ended = threading.Event()
+
+    def command():
+        station = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        codec = mavlink.MAVLink(None, 255, 190)
+        place_only, target = 0xDF8, (30.0, 30.0, -40.0)
+        place = mavlink.MAVLink_set_position_target_local_ned_message(
+            0, 1, 1, 1, place_only, *target, *(0.0,) * 8
+        )
+        while not ended.wait(0.02):
+            station.sendto(place.pack(codec), ('127.0.0.1', int(sim.url.rpartition(':')[2])))
+        station.close()
+
+    rival = threading.Thread(target=command)
+    rival.start()
+    told = fly(Setpoint(0, v_north_m_s=1.0), 6.0, until=lambda each: bool(each.other_commander))
+    ended.set()
+    rival.join()
+    assert 'a second commander' in told[-1].other_commander
+    assert 'a place' in told[-1].other_commander
 
 
 def test_a_vehicle_that_does_not_follow_is_accused_with_what_the_autopilot_reports(flown):

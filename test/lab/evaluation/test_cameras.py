@@ -11,7 +11,7 @@ from peace_ros.lab.evaluation import cameras
 from peace_ros.lab.evaluation.cameras import CASES, CameraLanding, land, main
 from peace_ros.lab.evaluation.wind import Landed, WindFlight
 
-GOOD = CameraLanding(Landed(1, True, 30.0, 0.3, 0.8, 19.8, 0.4, 0), 8.0, 8.5, 0.2)
+GOOD = CameraLanding(Landed(1, True, 30.0, 0.3, 0.8, 19.8, 0.4, 0, 0.0, 0.0, 8.5), 8.0, 8.5, 0.2)
 
 
 @pytest.mark.parametrize('case', CASES, ids=lambda case: case.name)
@@ -28,7 +28,7 @@ def test_a_camera_that_is_taken_for_another_one_is_noticed(monkeypatch, wrong):
     if wrong == 'stretched':
         flight._camera = Camera.from_degrees(352, 352, 95.0)
     else:
-        flight._core.place_camera(NADIR)
+        monkeypatch.setattr(flight._core._intake, '_mount', NADIR)
     landed = flight.run()
     landing = CameraLanding(landed, *flight.clearances_m, flight.map_error_m())
     assert not landing.is_good, landing

@@ -42,9 +42,23 @@ def test_a_guard_that_is_taken_away_is_noticed(monkeypatch, owner, name, what):
 
     careless = {'judge': old_rule, '_take': any_home}.get(name, lambda *_args, **_how: True)
     monkeypatch.setattr(owner, name, careless)
-    report = forged.run_forged(600, seed=3)
+    report = forged.run_forged(1000, seed=3)
     assert not report.holds
     assert any(what in line for line in report.wrongly_believed)
+
+
+def test_a_first_message_that_is_enough_is_noticed(monkeypatch):
+    """Of flights without terrain data: the third and the fourth of each four."""
+    pairs = Pairwise.__init__
+
+    def trusting(self, limit, **_first):
+        pairs(self, limit)
+
+    monkeypatch.setattr(Pairwise, '__init__', trusting)
+    monkeypatch.setattr(forged, 'FLIGHT', 100)
+    report = forged.run_forged(800, seed=3)
+    assert any('terrain data' in line for line in report.wrongly_believed)
+    assert any('rangefinder' in line for line in report.wrongly_believed)
 
 
 def test_a_traceback_is_counted(monkeypatch, capsys):

@@ -16,7 +16,7 @@ from peace_ros.cli.main import app
 from peace_ros.core.domain import ConfigurationError, Frame
 from peace_ros.lab.evaluation.words import CONDITIONS, load_frames, measure
 from peace_ros.simulation.drawing import draw_scene
-from peace_ros.simulation.rasters import RasterError
+from peace_ros.simulation.picture_files import RasterError
 
 
 class _Reader:

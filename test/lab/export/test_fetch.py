@@ -23,6 +23,7 @@ from peace_ros.core.domain import BundleError
 from peace_ros.core.inference import Bundle
 from peace_ros.lab.export import fetch
 from peace_ros.lab.export.fetch import fetch_bundle
+from peace_ros.lab.export.staging import put_in_place
 
 
 class RangeHandler(http.server.SimpleHTTPRequestHandler):
@@ -244,3 +245,74 @@ def test_a_server_without_the_files_says_whom_to_ask(
 def test_an_index_on_disk_will_do(bundle_folder: Path, tmp_path: Path) -> None:
     index = str(bundle_folder.parent / 'index.json')
     assert fetch_bundle('clip-tiny', index, tmp_path / 'here', no_progress)
+
+
+def test_two_downloads_of_one_bundle_do_not_mix(server: Any, tmp_path: Path) -> None:
+    def meanwhile(_file: str, _have: int, _size: int) -> None:
+        with pytest.raises(BundleError, match='another download of this bundle is under way'):
+            fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
+
+    fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', meanwhile)
+    assert Bundle.load(tmp_path / 'here').manifest.family == 'clip'
+
+
+def test_a_symbolic_link_in_the_way_is_not_followed(server: Any, tmp_path: Path) -> None:
+    outside = tmp_path / 'precious'
+    outside.write_bytes(b'mine')
+    parts = tmp_path / '.here.part'
+    parts.mkdir()
+    (parts / 'image_encoder.onnx').symlink_to(outside)
+    fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
+    assert outside.read_bytes() == b'mine'
+    assert not any(each.is_symlink() for each in (tmp_path / 'here').iterdir())
+    parts.symlink_to(tmp_path)
+    with pytest.raises(BundleError, match='is a symbolic link: remove it'):
+        fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
+
+
+@pytest.mark.parametrize(
+    ('before', 'after', 'is_refused'),
+    [
+        ('https://a/i.json', 'http://a/b/', True),
+        ('https://a/i.json', 'file:///etc/', True),
+        ('http://a/i.json', 'file:///etc/', True),
+        ('http://a/i.json', 'https://b/', False),
+        ('https://a/i.json', 'https://b/', False),
+        ('file:///i.json', 'http://b/', False),
+    ],
+)
+def test_a_less_safe_kind_of_address_is_refused(before: str, after: str, is_refused: bool) -> None:
+    if is_refused:
+        with pytest.raises(BundleError, match='or https may follow'):
+            fetch._refuse_less_safe(before, after)
+    else:
+        fetch._refuse_less_safe(before, after)
+
+
+def test_a_download_without_an_end_is_given_up(
+    server: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fetch, '_LONGEST_S', -1.0)
+    with pytest.raises(BundleError, match='call again, it continues'):
+        fetch_bundle('clip-tiny', url_of(server), tmp_path / 'here', no_progress)
+
+
+def test_an_index_that_is_a_device_is_not_read(tmp_path: Path) -> None:
+    with pytest.raises(BundleError, match='is not a file of at most'):
+        fetch_bundle('clip-tiny', '/dev/zero', tmp_path / 'here', no_progress)
+
+
+def test_the_name_of_a_bundle_never_vanishes_while_it_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ('new', 'old'):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / name).touch()
+
+    def never(*_: Any) -> None:
+        raise AssertionError('a step in which the name is missing')
+
+    monkeypatch.setattr(Path, 'rename', never)
+    put_in_place(tmp_path / 'new', tmp_path / 'old')
+    assert [each.name for each in (tmp_path / 'old').iterdir()] == ['new']
+    assert [each.name for each in tmp_path.iterdir()] == ['old']

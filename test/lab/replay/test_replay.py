@@ -5,15 +5,18 @@
 from __future__ import annotations
 
 import json
+from io import StringIO
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from rich.console import Console
 
 from peace_ros.core.domain import RecordingError
 from peace_ros.core.messages import diagnostic_values, frame_from_message, stamp_ns_of
 from peace_ros.lab.replay import ReplayOptions, SourceOptions, replay
+from peace_ros.lab.replay.console import replay_in_terminal
 from peace_ros.recording import BagReader, BagWriter, VideoWriter
 from peace_ros.recording.messages import jpeg_message, pose_stamped
 
@@ -123,3 +126,15 @@ def test_results_go_where_the_user_stands_and_not_beside_the_recording(
     monkeypatch.chdir(tmp_path)
     folders = [ReplayOptions(SMALL).new_folder() for _ in range(2)]
     assert folders == [tmp_path / 'runs' / 'small_replay', tmp_path / 'runs' / 'small_replay_2']
+
+
+def test_a_path_that_looks_like_markup_is_printed(tmp_path) -> None:
+    folder = tmp_path / '[' / 'y]'
+    folder.mkdir(parents=True)
+    with VideoWriter(folder / 'a.mp4', 5.0) as video:
+        for k in range(3):
+            video.write(pattern(30 * k))
+    console = Console(record=True, width=400, file=StringIO())
+    options = ReplayOptions(folder / 'a.mp4', out=tmp_path / 'out', part=SourceOptions(limit=1))
+    replay_in_terminal(options, console)
+    assert f'{folder}/a.mp4' in console.export_text()

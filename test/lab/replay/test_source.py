@@ -143,6 +143,36 @@ def test_clocks_that_never_meet_are_refused(tmp_path, shift_s) -> None:
         open_source(tmp_path / 'a.mcap', SourceOptions())
 
 
+def test_an_image_whose_clock_jumped_does_not_end_the_replay(tmp_path) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        for k in range(1, 5):
+            bag.write('/pose', k * SECOND, pose_stamped(k * SECOND, (0, 0, 50), LEVEL))
+            stamp_ns = k * SECOND if k != 2 else 10**18
+            bag.write('/image', k * SECOND, jpeg_message(picture(9 * k), stamp_ns))
+    taken = list(open_source(tmp_path / 'a.mcap', SourceOptions()).frames())
+    assert [each.frame is not None for each in taken] == [True, False, True, True]
+    assert 'after the last pose: its clock jumped' in taken[1].fault
+
+
+def test_a_video_takes_its_poses_from_a_log_beside_it(tmp_path) -> None:
+    with VideoWriter(tmp_path / 'DJI_1.mp4', 5.0) as video:
+        for k in range(11):
+            video.write(np.full((64, 64, 3), 20 * k, np.uint8))
+    cue = '{0}\n00:00:0{0},000 --> 00:00:0{0},900\n[rel_alt: {1}.5 abs_alt: 300.0]\n'
+    (tmp_path / 'DJI_1.SRT').write_text('\n'.join(cue.format(k, 60 - k) for k in range(3)))
+    source = open_source(tmp_path / 'DJI_1.mp4', SourceOptions())
+    assert [pose.altitude_agl_m for pose in source.poses] == [60.5, 59.5, 58.5]
+    assert [pose.stamp_ns for pose in source.poses] == [SECOND, 2 * SECOND, 3 * SECOND]
+    assert source.remarks[0].startswith('3 poses of DJI_1.SRT, times from the first frame')
+    later = open_source(tmp_path / 'DJI_1.mp4', SourceOptions(time_offset_s=0.5, ground_m=1.5))
+    assert later.poses[0].stamp_ns == 3 * SECOND // 2
+    assert later.poses[0].altitude_agl_m == 59.0
+    assumed = open_source(tmp_path / 'DJI_1.mp4', SourceOptions(altitude='30'))
+    assert assumed.poses[0].altitude_agl_m == 30.0
+    with pytest.raises(RecordingError, match='give --time-offset'):
+        open_source(tmp_path / 'DJI_1.mp4', SourceOptions(time_offset_s=100.0))
+
+
 def test_poses_above_sea_level_are_put_above_ground(tmp_path) -> None:
     path = write_bag(tmp_path / 'a.mcap')
     pose = open_source(path, SourceOptions(ground_m=35.0)).poses[0]
@@ -158,7 +188,7 @@ def test_a_video_gets_a_camera_and_an_altitude(tmp_path) -> None:
     assert len(stamps(source)) == 11
     assert source.options.assumed_camera(64, 64) == Camera.from_degrees(64, 64, 60.0)
     assert next(source.frames()).frame.camera is None
-    assert [source.poses[k].altitude_agl_m for k in (0, 5, 10)] == pytest.approx([80, 55, 30])
+    assert [source.poses[k].altitude_agl_m for k in (0, 10, 20)] == pytest.approx([80, 55, 30])
     assert source.remarks == ['no altitude was recorded: 80:30 m is assumed, linear (--altitude)']
 
 
@@ -184,6 +214,7 @@ def test_a_bad_source_is_one_sentence(tmp_path, name) -> None:
         {'fov_x_deg': 180.0},
         {'mount_yaw_deg': 400.0},
         {'ground_m': float('nan')},
+        {'time_offset_s': float('nan')},
     ],
 )
 def test_senseless_parts_are_refused(given) -> None:

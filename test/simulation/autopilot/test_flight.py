@@ -7,7 +7,7 @@ from math import cos, hypot, pi, sin
 import pytest
 
 from peace_ros.simulation.autopilot.flight import Flight
-from peace_ros.simulation.autopilot.guided import PositionTarget
+from peace_ros.simulation.autopilot.guided import PlaceTarget, PositionTarget
 from peace_ros.simulation.autopilot.modes import LandedState, Mode, Result
 from peace_ros.simulation.autopilot.personality import Kind, Personality
 from peace_ros.simulation.autopilot.physics import Physics
@@ -182,11 +182,13 @@ def test_reentering_guided_holds_without_remembering_the_old_setpoint(hovering):
     assert hovering.physics.north_m == pytest.approx(stands_m, abs=0.05)
 
 
-def test_rtl_comes_home_and_lands(hovering):
+def test_rtl_comes_home_and_lands_and_stays_rtl(hovering):
     steer(hovering, 10.0, (3, 2, 0))
     hovering.lose_radio()
     assert hovering.mode is Mode.RTL
+    until(hovering, lambda: hovering.landed_state is LandedState.LANDING, 120.0)
     until(hovering, lambda: not hovering.armed, 120.0)
+    assert hovering.mode is Mode.RTL
     assert abs(hovering.physics.north_m) < 2.0
     assert abs(hovering.physics.east_m) < 2.0
 
@@ -349,3 +351,70 @@ def test_flies_a_circle_without_leaving_it(hovering):
     for i in range(80):
         steer(hovering, 0.25, (2 * cos(i / 8), 2 * sin(i / 8), 0))
     assert abs(hovering.physics.down_m + 20.0) < 0.5
+
+
+def test_flies_to_a_place_and_stays_there_without_more_setpoints(hovering):
+    hovering.take_place(PlaceTarget((30.0, -12.0, -25.0)))
+    let(hovering, 30.0)
+    assert hovering.position_m == pytest.approx((30.0, -12.0, -25.0), abs=0.3)
+    assert hovering.target_place_m == (30.0, -12.0, -25.0)
+    steer(hovering, 1.0, (0, 0, 0))
+    assert hovering.target_place_m is None, 'a velocity ends it'
+
+
+def test_a_place_is_flown_to_at_the_chosen_speed(hovering):
+    assert hovering.change_speed(2.0) is Result.ACCEPTED
+    hovering.take_place(PlaceTarget((60.0, 0.0, -20.0)))
+    let(hovering, 8.0)
+    assert hovering.velocity_m_s[0] == pytest.approx(2.0, abs=0.1)
+    assert hovering.change_speed(0.0) is Result.DENIED
+
+
+def test_repositioning_needs_guided_or_leave_to_change_the_mode(hovering):
+    place = PlaceTarget((5.0, 0.0, -20.0))
+    hovering.set_mode(Mode.LOITER)
+    assert hovering.reposition(place, change_mode=False) is Result.DENIED
+    assert hovering.mode is Mode.LOITER
+    assert hovering.reposition(place, change_mode=True) is Result.ACCEPTED
+    assert hovering.mode is Mode.GUIDED
+    let(hovering, 12.0)
+    assert hovering.position_m[0] == pytest.approx(5.0, abs=0.2)
+
+
+def test_a_place_that_cannot_be_stops_the_vehicle(hovering):
+    hovering.take_place(PlaceTarget((100.0, 0.0, -20.0)))
+    let(hovering, 4.0)
+    hovering.refuse_place()
+    let(hovering, 8.0)
+    assert hovering.velocity_m_s == pytest.approx((0, 0, 0), abs=0.05)
+    assert hovering.position_m[0] < 60.0
+
+
+@pytest.mark.parametrize(('stick', 'climb_m_s'), [(1.0, 2.5), (-0.4, -1.0)])
+def test_the_throttle_stick_climbs_and_sinks_in_loiter(hovering, stick, climb_m_s):
+    let(hovering, 5.0)
+    hovering.move_throttle(stick, 5.0)
+    let(hovering, 2.0)
+    assert hovering.velocity_m_s[2] == pytest.approx(0.0, abs=0.05), 'not in GUIDED'
+    hovering.set_mode(Mode.LOITER)
+    let(hovering, 2.5)
+    assert hovering.velocity_m_s[2] == pytest.approx(-climb_m_s, abs=0.1)
+    let(hovering, 5.0)
+    assert hovering.velocity_m_s[2] == pytest.approx(0.0, abs=0.05), 'it was let go'
+
+
+def test_turns_where_condition_yaw_says_and_a_setpoint_ends_it(hovering):
+    hovering.turn(pi / 2)
+    let(hovering, 5.0)
+    assert hovering.physics.yaw_rad == pytest.approx(pi / 2, abs=0.05)
+    steer(hovering, 6.0, (3, 0, 0), mask=0xDC7)
+    assert hovering.physics.yaw_rad == pytest.approx(0.0, abs=0.05)
+
+
+def test_px4_takes_off_to_its_own_altitude_when_it_is_told_none():
+    flight = Flight(Physics(), Personality(Kind.PX4))
+    let(flight, 43.0)
+    assert flight.arm() is Result.ACCEPTED
+    assert flight.take_off(float('nan')) is Result.ACCEPTED
+    until(flight, lambda: flight.landed_state is LandedState.IN_AIR, 20.0)
+    assert -flight.physics.down_m == pytest.approx(2.5, abs=0.3)

@@ -25,9 +25,13 @@ def test_an_unknown_frame_stops_the_vehicle(frame):
     assert understand(PositionTarget(frame, HOLD_HEADING, (1, 2, 3)), 0.0) is STOP
 
 
-@pytest.mark.parametrize('mask', [0x5FF, 0x7C7, 0xDF8])
+@pytest.mark.parametrize('mask', [0x5FF, 0x607, 0xDF8])
 def test_a_mask_without_velocity_or_with_force_stops_the_vehicle(mask):
     assert understand(PositionTarget(1, mask, (1, 2, 3)), 0.0) is STOP
+
+
+def test_a_force_whose_acceleration_is_ignored_does_not_count():
+    assert understand(PositionTarget(1, 0x7C7, (1, 2, 3)), 0.0).v_north_m_s == 1
 
 
 def test_velocity_alone_turns_the_nose_to_the_travel():

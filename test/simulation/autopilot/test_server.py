@@ -144,6 +144,13 @@ def test_answers_requests_for_a_message(gcs, number):
         (22, (0, 0, 0, 0, 0, 0, 10.0), 4),
         (42007, (2.0,), 0),
         (42007, (9.0,), 2),
+        (192, (-1, 0, 0, 0, 48.8, 2.3, 20.0), 2),
+        (178, (1, 3.0), 4),
+        (115, (90.0, 0, 0, 0), 0),
+        (115, (400.0, 0, 0, 0), 4),
+        (300, (), 4),
+        (410, (), 0),
+        (520, (), 0),
     ],
 )
 def test_acknowledges_with_a_meaningful_result(gcs, command, params, result):
@@ -180,6 +187,72 @@ def test_answers_timesync_and_parameters(gcs):
     assert heard['TIMESYNC'].ts1 == 123
     assert heard['TIMESYNC'].tc1 != 0
     assert heard['PARAM_VALUE'].param_value == 3.0
+
+
+def test_a_data_stream_has_its_messages_at_its_rate_until_it_is_stopped(gcs):
+    gcs.hear(45.0)
+    gcs.send(mavlink.MAVLink_request_data_stream_message(1, 1, 0, 5, 1))
+    kinds = gcs.kinds(4.0)
+    for kind in ('ATTITUDE', 'VFR_HUD', 'RAW_IMU', 'SYS_STATUS', 'BATTERY_STATUS', 'RC_CHANNELS'):
+        assert kinds.count(kind) == pytest.approx(20, abs=1), kind
+    gcs.send(mavlink.MAVLink_request_data_stream_message(1, 1, 10, 5, 0))
+    gcs.hear(0.2)
+    kinds = gcs.kinds(2.0)
+    assert 'ATTITUDE' not in kinds
+    assert 'VFR_HUD' in kinds
+
+
+def test_px4_sends_unasked_and_knows_no_data_streams():
+    sim = AutopilotSim(AutopilotParameters(port=0, autopilot='px4'))
+    gcs = GroundStation(sim)
+    gcs.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    gcs.hear(45.0)
+    assert gcs.kinds(4.0).count('ATTITUDE') == pytest.approx(60, abs=2)
+    gcs.send(mavlink.MAVLink_request_data_stream_message(1, 1, 0, 50, 1))
+    assert gcs.kinds(4.0).count('ATTITUDE') == pytest.approx(60, abs=2)
+    gcs.command(511, 30, -1)
+    gcs.hear(0.2)
+    assert 'ATTITUDE' not in gcs.kinds(2.0)
+    gcs.command(511, 30, 0)
+    assert gcs.kinds(4.0).count('ATTITUDE') == pytest.approx(60, abs=2), 'the default again'
+    gcs.command(510, 30)
+    (told,) = [m for m in gcs.hear(0.3) if m.get_type() == 'MESSAGE_INTERVAL']
+    assert told.interval_us == pytest.approx(66_667, abs=1)
+    gcs.socket.close()
+    sim.close()
+
+
+def test_a_request_for_a_file_is_refused_at_once(gcs):
+    open_file = 4
+    payload = bytes([7, 0, 9, open_file, 3, 0, 0, 0, 0, 0, 0, 0]) + b'@PA'
+    message = mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, payload.ljust(251, b'\0'))
+    gcs.send(message)
+    (told,) = [m for m in gcs.hear(0.2) if m.get_type() == 'FILE_TRANSFER_PROTOCOL']
+    nak, no_file = 129, 10
+    assert list(told.payload[:6]) == [8, 0, 9, nak, 1, open_file]
+    assert told.payload[12] == no_file
+
+
+def test_a_global_place_is_flown_to_and_told_back(gcs, sim):
+    gcs.hear(45.0)
+    gcs.command(176, 1.0, 4.0)
+    gcs.command(400, 1.0)
+    gcs.command(22, 0, 0, 0, 0, 0, 0, 10.0)
+    gcs.hear(12.0)
+    latitude, longitude = 488_581_000, 23_421_000
+    target = (0, 1, 1, 6, 0xDF8, latitude, longitude, 12.0, *(0.0,) * 8)
+    gcs.send(mavlink.MAVLink_set_position_target_global_int_message(*target))
+    gcs.command(511, 87, 200_000)
+    gcs.command(511, 85, 200_000)
+    told = {m.get_type(): m for m in gcs.hear(15.0)}
+    globe, local = told['POSITION_TARGET_GLOBAL_INT'], told['POSITION_TARGET_LOCAL_NED']
+    assert (globe.lat_int, globe.lon_int) == pytest.approx((latitude, longitude), abs=1)
+    assert globe.alt == pytest.approx(47.0)
+    truth = sim.truth()
+    assert (local.x, local.y, local.z) == pytest.approx(
+        (truth.north_m, truth.east_m, truth.down_m), abs=0.3
+    )
+    assert local.type_mask == 0xDF8
 
 
 def test_each_peer_has_its_own_streams(gcs, sim):

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
-from peace_ros.core.domain import SAFE_LABELS, Label
+from peace_ros.core import yaml_files
+from peace_ros.core.domain import SAFE_LABELS, ConfigurationError, Label
 from peace_ros.core.resources import config_dir
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError, SampleError
 
@@ -167,9 +167,9 @@ def find_table(name_or_path: str) -> Path:
 def read_yaml(path: Path) -> dict[str, Any]:
     """Return the mapping in a YAML file; raises DatasetError."""
     try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, yaml.YAMLError, UnicodeDecodeError) as error:
-        raise DatasetError(f'{path} cannot be read as YAML: {error}') from error
+        content = yaml_files.read_yaml(path, 'give a class table as in config/datasets')
+    except ConfigurationError as error:
+        raise DatasetError(str(error)) from error
     if not isinstance(content, dict) or not isinstance(content.get('classes'), dict):
         raise DatasetError(f'{path}: has no table "classes"; see config/datasets/common.yaml')
     return content

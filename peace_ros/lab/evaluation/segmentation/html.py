@@ -19,6 +19,7 @@ from peace_ros.lab.evaluation.segmentation.figures import Figures
 from peace_ros.lab.evaluation.segmentation.pictures import LABEL_COLOURS, PANELS, panels
 from peace_ros.lab.evaluation.segmentation.run import Outcome
 from peace_ros.lab.evaluation.segmentation.table import percent, remarks_of, sections
+from peace_ros.recording.run_folder import write_whole
 
 try:
     from jinja2 import Environment, StrictUndefined
@@ -69,7 +70,7 @@ def write_report(
         skipped=outcome.skipped,
     )
     path = folder / NAME
-    path.write_text(page, encoding='utf-8')
+    write_whole(path, page, 'report')
     return path
 
 

@@ -27,12 +27,8 @@ from peace_ros.lab.evaluation.segmentation.classes import (
 )
 from peace_ros.lab.evaluation.segmentation.errors import DatasetError, SampleError
 from peace_ros.simulation.drawing import draw_scene
-from peace_ros.simulation.rasters import (
-    IMAGE_SUFFIXES,
-    RasterError,
-    read_indices,
-    read_photo,
-)
+from peace_ros.simulation.picture_files import RasterError
+from peace_ros.simulation.rasters import IMAGE_SUFFIXES, read_indices, read_photo
 
 CAMERA_PX = 1056
 """Side of the drawn views, where that is not finer than FINEST_M."""
@@ -43,6 +39,8 @@ DRAWN_SEED = 20_000_000
 HEIGHTS_M = (5.0, 120.0)
 """Of the drawn views, under a lens of FOV_DEG; even in the logarithm."""
 FOV_DEG = 73.0
+
+_LARGEST_TABLE = 256 << 20
 
 Pair = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 """Image, height x width x 3 RGB, and its labels, height x width of Label."""
@@ -95,7 +93,7 @@ class FileSample:
     def load(self) -> Pair:
         """Read both files."""
         try:
-            image, known = read_photo(self.image)
+            image, known, orientation = read_photo(self.image)
             indices = self.convert.masks == 'indices'
             raster = read_indices(self.label) if indices else read_photo(self.label).rgb
         except RasterError as error:
@@ -103,7 +101,9 @@ class FileSample:
         if raster.shape[:2] != image.shape[:2]:
             raise SampleError(
                 f'labels of {raster.shape[1]} x {raster.shape[0]} px for an image of '
-                f'{image.shape[1]} x {image.shape[0]} px: both must be of one size'
+                f'{image.shape[1]} x {image.shape[0]} px'
+                + (f', upright by its EXIF orientation {orientation}' if orientation != 1 else '')
+                + ': both must be of one size'
             )
         labels = self.convert(raster)
         if known is not None:
@@ -236,6 +236,10 @@ def manifest_source(manifest: Path, split: str, classes: str, mixed: str) -> Sam
 def _csv_rows(path: Path) -> list[dict[str, str]]:
     """Return the rows by column, also as spreadsheets write them (byte order mark, ;)."""
     try:
+        if (path.exists() and not path.is_file()) or path.stat().st_size > _LARGEST_TABLE:
+            raise DatasetError(
+                f'{path} is not a regular file of up to {_LARGEST_TABLE >> 20} MiB: give a CSV'
+            )
         text = path.read_text(encoding='utf-8-sig')
         head = text.partition('\n')[0]
         delimiter = max(',;\t', key=head.count)
