@@ -36,7 +36,7 @@ class TimeMap:
         self._samples: deque[tuple[int, int]] = deque(maxlen=WINDOW)
         self._deviating = 0
         self._offset_ns: int | None = None
-        self._last_stamp_ns = 0
+        self._last_stamp_ns: dict[str, int] = {}
         self.steps = 0
         """How often one of the clocks was seen to step."""
 
@@ -94,8 +94,8 @@ class TimeMap:
         drifts = max(quick) - min(quick) > STEP_NS + limit_ns
         self._offset_ns = None if drifts else round(median(quick))
 
-    def stamp_ns(self, boot_ms: int, received_ns: int) -> int:
-        """Return the node clock of a moment of the autopilot's; stamps never go back.
+    def stamp_ns(self, boot_ms: int, received_ns: int, series: str = '') -> int:
+        """Return the node clock of a moment of the autopilot's; stamps of a series never go back.
 
         Where the offset is unknown or in doubt, or gives a moment in the future or long ago, it is
         the moment of receipt: a simulation that stood still for a moment has lost that time.
@@ -105,8 +105,9 @@ class TimeMap:
             mapped_ns = boot_ms * 1_000_000 + self._offset_ns
             if received_ns - OLDEST_NS <= mapped_ns <= received_ns + AHEAD_NS:
                 stamp_ns = min(mapped_ns, received_ns)
-        if received_ns < self._last_stamp_ns - OLDEST_NS:
-            self._last_stamp_ns = 0  # our own clock stepped back
-        stamp_ns = max(stamp_ns, self._last_stamp_ns + 1)
-        self._last_stamp_ns = stamp_ns
+        last_ns = self._last_stamp_ns.get(series, 0)
+        if received_ns < last_ns - OLDEST_NS:
+            last_ns = 0  # our own clock stepped back
+        stamp_ns = max(stamp_ns, last_ns + 1)
+        self._last_stamp_ns[series] = stamp_ns
         return stamp_ns
