@@ -17,13 +17,13 @@ MARKER = Path('config/ament') / NAME
 # file from a build folder without them and finds them in the checkout instead.)
 SHIPPED = [folder for folder in ('config', 'models') if Path(__file__).with_name(folder).is_dir()]
 
-# Training runs in a checkout, where its annotations lie; an installed package has neither.
-LEFT_OUT = [f'{NAME}.lab.training', f'{NAME}.lab.training.*']
+# Training and the reading of damaged files run in a checkout, where annotations and recordings lie.
+LEFT_OUT = [f'{NAME}.lab.{room}' for room in ('training', 'training.*', 'damage')]
 DATA_LEFT_OUT = ['ament/*', 'annotations/*']
 
 # ROS looks for launch files and what they name under share/, for nothing else.
 SHARED = (
-    'config/*.yaml',
+    'config/[!f]*.yaml',  # not faults.yaml, which only the package itself reads
     'config/*.xml',
     'config/presets/*.yaml',
     'config/rviz/*.rviz',

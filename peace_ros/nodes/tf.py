@@ -41,6 +41,7 @@ class TfTree:
                 f'(ros-jazzy-tf2-ros-py), or leave {parameter} as it is by default'
             ) from error
         self._error: type[Exception] = tf2.TransformException
+        self._untimely: type[Exception] = tf2.ExtrapolationException
         self._buffer = tf2.Buffer()
         self._listener = tf2.TransformListener(self._buffer, node, spin_thread=False)
 
@@ -59,7 +60,11 @@ class TfTree:
         parent, child = parent.lstrip('/'), child.lstrip('/')
         try:
             return self._buffer.lookup_transform(parent, child, Time(nanoseconds=stamp_ns))
+        except self._untimely as error:
+            # It happens in every step while a transform is slower than the poses.
+            raise VehicleError(f'tf from {parent} to {child}: {error}') from error
         except self._error as error:
+            # To read all frames takes long.
             frames = yaml.safe_load(self._buffer.all_frames_as_yaml()) or {}
             parents = {name: about['parent'] for name, about in frames.items()}
             end = end_of_chain(parents, child, parent)
@@ -103,6 +108,8 @@ class TfMounts:
                 mount = mount_from_transform(found)
             except ConfigurationError as error:
                 self.problem = str(error)
+                self._waiting.clear()
+                return
             except VehicleError as error:
                 if self._waiting[-1].stamp_ns - stamp_ns < _WAIT_NS:
                     return

@@ -43,8 +43,9 @@ class FrameChoice:
         if now_s - self._last_s >= (_UNSEEN_S if self.is_engaged else _IDLE_S):
             self._choose(stamp_ns, now_s)
             return True
+        # A camera may repeat a stamp, as one that never sets it does.
+        self._bytes += len(cdr) - len(self._waiting.get(stamp_ns, b''))
         self._waiting[stamp_ns] = cdr
-        self._bytes += len(cdr)
         while len(self._waiting) > _MOST_WAITING or self._bytes > _MOST_WAITING_BYTES:
             self._drop_oldest()
         return False

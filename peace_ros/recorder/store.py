@@ -78,7 +78,7 @@ class RecordingStore:
         if self.problem:
             self._say(f'recording goes on in {self._file.path}; {self.lost} messages were lost')
             self.problem = ''
-        self._keep_bounds(self._file)
+        self._attempt(self._keep_bounds)
 
     def close(self) -> None:
         """Finish the file in progress."""

@@ -31,9 +31,9 @@ _OFFSETS = ('mount_x', 'mount_y', 'mount_z')
 def mount_of(parameters: Mapping[str, Any]) -> Mount | None:
     """Return how the camera is mounted by the parameters of the landing node.
 
-    None where they are not known, or where tf says it.
+    None where they are not known, or where tf or a gimbal says it.
     """
-    if parameters.get('mount_source') != 'parameters':
+    if parameters.get('mount_source') != 'parameters' or parameters.get('vehicle.follow_gimbal'):
         return None
     try:
         roll, pitch, yaw = (float(parameters[name]) for name in _ANGLES)

@@ -51,6 +51,7 @@ _INFOS = 10
 _MOST_CELLS = 4_000_000
 _PARAMETERS = (
     *('camera_width', 'camera_height', 'camera_fov', 'mount_source'),
+    'vehicle.follow_gimbal',
     *('mount_roll', 'mount_pitch', 'mount_yaw', 'mount_x', 'mount_y', 'mount_z'),
     *('safe_altitude_m', 'handover_altitude_m', 'lateral_speed_limit', 'z_speed_landing'),
     *('landing_lateral_speed_limit', 'z_speed_climbing', 'geofence_radius_m', 'search_radius_m'),

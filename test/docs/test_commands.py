@@ -132,8 +132,8 @@ def _lines_of_code(text: str) -> Iterator[str]:
 
 def _reason(words: tuple[str, ...]) -> str | None:
     """Return why a command is not run, None where nothing says it."""
-    if Path(words[0]).name == 'peace':
-        words = ('peace', *words[1:])
+    if (name := Path(words[0]).name) in {'peace', 'pip'}:
+        words = (name, *words[1:])
     for count in (2, 1):
         if (reason := NOT_RUN.get(' '.join(words[:count]))) is not None:
             return reason

@@ -65,3 +65,10 @@ def test_frames_that_wait_are_bounded() -> None:
         assert not choice.image(number, bytes(10_000_000), 0.5)
     assert choice.heatmap(2, 0.6) == (True, None), 'dropped, 64 MB were exceeded'
     assert choice.heatmap(11, 0.9)[1] is not None
+
+
+def test_a_camera_that_repeats_its_stamp_is_recorded_and_bounded() -> None:
+    choice = engaged()
+    for _ in range(10):
+        assert not choice.image(2, bytes(10_000_000), 0.5)
+    assert choice.heatmap(2, 0.6) == (True, bytes(10_000_000))

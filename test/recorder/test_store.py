@@ -200,3 +200,21 @@ def test_a_folder_that_cannot_be_made_is_said(tmp_path, said) -> None:
 def test_bounds_in_which_no_file_has_room_are_refused() -> None:
     with pytest.raises(ConfigurationError, match='at least twice file_mb'):
         RecorderParameters(file_mb=100, total_mb=150)
+
+
+def test_a_folder_that_goes_away_stops_the_recording_until_it_can_be_made_again(
+    tmp_path, said
+) -> None:
+    clock, folder = Clock(), tmp_path / 'stick'
+    store = RecordingStore(folder, SMALL, said.append, clock)
+    store.add(note(1))
+    store.flush()
+    shutil.rmtree(folder)
+    store.flush()
+    assert 'stick' in store.problem
+    clock.now_s = 11.0
+    store.add(note(2))
+    store.flush()
+    assert store.problem == ''
+    store.close()
+    assert [stamps(each) for each in files(folder)] == [[2]]

@@ -54,6 +54,8 @@ def test_a_mount_or_camera_that_is_not_known_is_none():
     known = {**angles, **dict.fromkeys(('mount_x', 'mount_y', 'mount_z'), 0.0)}
     assert mount_of({**known, 'mount_source': 'parameters'}) == NADIR
     assert mount_of({**known, 'mount_source': 'tf'}) is None
+    gimbal = {'mount_source': 'parameters', 'vehicle.follow_gimbal': True}
+    assert mount_of({**known, **gimbal}) is None
     assert mount_of({'mount_source': 'parameters'}) is None
     assert camera_of({}) is None
     size = {'camera_width': 400, 'camera_height': 400, 'camera_fov': 90.0}

@@ -149,13 +149,14 @@ class LandingCore:
         self, now_ns: int, telemetry: Telemetry | None, telemetry_age_s: float
     ) -> str:
         """Return why a landing cannot begin now, empty when it can; as for :meth:`step`."""
-        return self._intake.distrusted or engagement_problem(
+        return engagement_problem(
             self.state,
             telemetry,
             telemetry_age_s,
             self.map_age_s(now_ns),
             self.parameters,
             self.last_rejection,
+            self._intake.distrusted,
         )
 
     def disengage(self) -> None:

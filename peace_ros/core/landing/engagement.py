@@ -19,6 +19,7 @@ def engagement_problem(
     map_age_s: float,
     parameters: LandingParameters,
     last_rejection: str = '',
+    distrusted: str = '',
 ) -> str:
     """Return a sentence why a landing cannot begin now, empty when it can.
 
@@ -31,11 +32,14 @@ def engagement_problem(
         map_age_s: Since the newest heatmap in the map was taken; infinite without one.
         parameters: Their limits of age and altitude hold here too.
         last_rejection: Why a heatmap did not reach the map, empty when all did.
+        distrusted: Why inputs cannot be used, whatever they say; empty when they can.
     """
     if state not in _MAY_BEGIN:
         return f'a landing is under way already: {state.value}'
-    return bad_vehicle(telemetry, telemetry_age_s, parameters) or bad_map(
-        map_age_s, last_rejection, parameters
+    return (
+        bad_vehicle(telemetry, telemetry_age_s, parameters)
+        or distrusted
+        or bad_map(map_age_s, last_rejection, parameters)
     )
 
 

@@ -128,7 +128,8 @@ class Helm:
         if self._since_ns is None:
             self._since_ns = now_ns
         pose = valid_pose(telemetry, p)
-        bad_data = distrusted or bad_telemetry(telemetry, telemetry_age_s, p)
+        # A silent vehicle reports no gimbal either: the cause comes first.
+        bad_data = bad_telemetry(telemetry, telemetry_age_s, p) or distrusted
         bad_data = bad_data or bad_map(sighting.map_age_s, last_rejection, p) or heights.problem
         site = None if bad_data else sighting.reachable
         if self._engaged:

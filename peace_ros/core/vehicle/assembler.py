@@ -154,7 +154,7 @@ class Assembler:
             self._absurd = absurd
         if absurd:
             self.rejected += 1
-        elif self._is_late(kind, getattr(message, 'time_boot_ms', None), steady_ns):
+        elif self._is_late(message, kind, steady_ns):
             self.late += 1
         else:
             self.arrived_ns[message.get_msgId()] = steady_ns
@@ -255,9 +255,12 @@ class Assembler:
         _, flags, before = self._estimator
         return flags if not _has_position(flags) else before
 
-    def _is_late(self, kind: str, boot_ms: int | None, steady_ns: int) -> bool:
+    def _is_late(self, message: Any, kind: str, steady_ns: int) -> bool:
+        boot_ms: int | None = getattr(message, 'time_boot_ms', None)
         if boot_ms is None:
             return False
+        # Several gimbals are reported in the same millisecond.
+        series = f'{kind} {message.gimbal_device_id}' if kind == GIMBAL else kind
         before_ms = self._boots.newest_ms
         moment = self._boots.judge(boot_ms, steady_ns, self._heartbeat_ns)
         if moment is BootMoment.DOUBTFUL:
@@ -267,8 +270,8 @@ class Assembler:
             self._forget()
         elif moment is BootMoment.STEPPED:
             self._follow_clock(boot_ms - before_ms)
-        newest_ms = self._newest_boot_ms.get(kind, -1)
-        self._newest_boot_ms[kind] = max(newest_ms, boot_ms)
+        newest_ms = self._newest_boot_ms.get(series, -1)
+        self._newest_boot_ms[series] = max(newest_ms, boot_ms)
         return kind in IN_ORDER and boot_ms <= newest_ms
 
     def _follow_clock(self, by_ms: int) -> None:
@@ -406,7 +409,8 @@ class Assembler:
         self._others.take_terrain(m, steady_ns)
 
     def _take_gimbal(self, m: Any, stamp_ns: int, steady_ns: int) -> None:
-        self._gimbal.take(m, self._clock.stamp_ns(m.time_boot_ms, stamp_ns), steady_ns)
+        at_ns = self._clock.stamp_ns(m.time_boot_ms, stamp_ns, f'gimbal {m.gimbal_device_id}')
+        self._gimbal.take(m, at_ns, steady_ns)
 
     def _text(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
         self.texts.take(m, steady_ns)

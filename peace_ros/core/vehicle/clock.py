@@ -36,7 +36,7 @@ class TimeMap:
         self._samples: deque[tuple[int, int]] = deque(maxlen=WINDOW)
         self._deviating = 0
         self._offset_ns: int | None = None
-        self._last_stamp_ns = 0
+        self._last_stamp_ns: dict[str, int] = {}
         self.steps = 0
         """How often one of the clocks was seen to step."""
 
@@ -107,16 +107,17 @@ class TimeMap:
         fits = received_ns - OLDEST_NS <= mapped_ns <= received_ns + AHEAD_NS
         return min(mapped_ns, received_ns) if fits else None
 
-    def stamp_ns(self, boot_ms: int, received_ns: int) -> int:
-        """Return the node clock of a moment of the autopilot's; stamps never go back.
+    def stamp_ns(self, boot_ms: int, received_ns: int, series: str = '') -> int:
+        """Return the node clock of a moment of the autopilot's; stamps of a series never go back.
 
         Where the offset is unknown or in doubt, or gives a moment in the future or long ago, it is
         the moment of receipt: a simulation that stood still for a moment has lost that time.
         """
         mapped_ns = self.moment_ns(boot_ms * 1_000_000, received_ns)
         stamp_ns = received_ns if mapped_ns is None else mapped_ns
-        if received_ns < self._last_stamp_ns - OLDEST_NS:
-            self._last_stamp_ns = 0  # our own clock stepped back
-        stamp_ns = max(stamp_ns, self._last_stamp_ns + 1)
-        self._last_stamp_ns = stamp_ns
+        last_ns = self._last_stamp_ns.get(series, 0)
+        if received_ns < last_ns - OLDEST_NS:
+            last_ns = 0  # our own clock stepped back
+        stamp_ns = max(stamp_ns, last_ns + 1)
+        self._last_stamp_ns[series] = stamp_ns
         return stamp_ns

@@ -85,7 +85,12 @@ class Wire:
             self._parser.buf, self._parser.buf_index = bytearray(), 0
             message = self._parser.parse_char(self._rest[at : at + _LONGEST_BYTES])
             if message is None:
-                break
+                # What is missing of a datagram does not follow: this was no start.
+                if not self._datagrams or searched >= _MOST_SEARCHES:
+                    break
+                searched += 1
+                at += 1
+                continue
             if message.get_msgId() >= 0:
                 found.append(message)
             elif self._rest[at] in _STARTS and searched < _MOST_SEARCHES:

@@ -165,9 +165,11 @@ def _frames() -> Iterator[None]:
         while not stop.wait(0.2):
             images.publish(image_message(pixels, 'rgb8', camera.get_clock().now().nanoseconds))
 
-    rclpy.init(args=[])
+    # Of its own: the process of a test may have used the default one.
+    context = rclpy.Context()
+    rclpy.init(args=[], context=context)
     try:
-        camera = Node('camera')
+        camera = Node('camera', context=context)
         images = camera.create_publisher(Image, 'image', IMAGE_OUT)
         with ThreadPoolExecutor(1) as pool:
             published = pool.submit(publish)
@@ -177,7 +179,7 @@ def _frames() -> Iterator[None]:
                 stop.set()
             published.result()
     finally:
-        rclpy.try_shutdown()
+        context.try_shutdown()
 
 
 if __name__ == '__main__':

@@ -90,6 +90,19 @@ def test_a_silent_gimbal_is_a_hold_with_a_reason_and_nothing_is_engaged(core):
     assert again.state is not State.HOLD
 
 
+def test_a_silent_vehicle_is_not_blamed_on_its_gimbal(core):
+    fly(core, 1.0, 3.0, lambda time_s: pitched(time_s, -90.0))
+    core.engage()
+    fly(core, 3.0, 4.0, lambda time_s: pitched(time_s, -90.0))
+    silent = core.step(5 * S, telemetry(4.0, None), 1.0)
+    assert silent.state is State.HOLD
+    assert 'telemetry' in silent.reason
+    assert 'gimbal' not in silent.reason
+    core.disengage()
+    core.step(5 * S, None, 1.0)
+    assert 'gimbal' not in core.engagement_problem(5 * S, None, 1.0)
+
+
 def test_a_failure_that_the_gimbal_reports_is_the_reason(core):
     told = fly(core, 1.0, 2.0, lambda time_s: pitched(time_s, -90.0, problem='it is broken'))
     assert core.engagement_problem(2 * S, telemetry(2.0, None), 0.1) == 'it is broken'

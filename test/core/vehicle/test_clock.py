@@ -110,3 +110,11 @@ def test_stamps_never_go_back_unless_our_own_clock_does(messages):
         last_ns, last_received_ns = stamp_ns, received_ns
     if last_received_ns > 5 * SECOND:
         assert clock.stamp_ns(0, 1) == 1, 'a clock that stepped back begins anew'
+
+
+def test_what_is_stamped_at_receipt_does_not_delay_the_stamps_of_another_series():
+    clock = TimeMap()
+    now_ns = feed(clock, 0, begin_ns=10 * SECOND, jitter_ms=0.0)
+    assert clock.stamp_ns(1, now_ns, 'gimbal') == now_ns, 'a clock of its own: as received'
+    sent_ns = now_ns - 100 * MS
+    assert clock.stamp_ns(sent_ns // MS, now_ns) == pytest.approx(sent_ns, abs=3 * MS)

@@ -51,6 +51,12 @@ def test_the_flags_say_whether_yaw_counts_from_north(flags, in_earth):
     assert told.problem == ''
 
 
+def test_gimbals_that_report_in_the_same_millisecond_are_told_apart():
+    both = [report(boot_ms=1000, device=1), report(boot_ms=1000, device=2)]
+    assert 'set vehicle.gimbal_id' in heard(listener(), *both).problem
+    assert heard(listener(gimbal_id=2), *both).problem == ''
+
+
 def test_nothing_is_known_before_the_first_report_and_after_a_stale_one():
     assembler = listener(pose_limit_s=0.5)
     assert assembler.telemetry(0).gimbal is None

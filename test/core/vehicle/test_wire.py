@@ -66,8 +66,16 @@ def test_half_a_datagram_does_not_hide_the_next() -> None:
     assert message.time_boot_ms == 1
 
 
-def test_bytes_that_all_look_like_a_start_take_little_time() -> None:
-    wire = Wire(1, None, datagrams=False)
+@pytest.mark.parametrize('stray', [b'\xfd', b'\xfe', b'\xfd\xff\x00\x00', b'\x00'])
+def test_a_stray_byte_in_a_datagram_does_not_hide_the_messages_after_it(stray) -> None:
+    wire = Wire(1, None, datagrams=True)
+    found = wire.decode(stray + b''.join(attitudes()[:3]))
+    assert [m.time_boot_ms for m in found] == [0, 1, 2]
+
+
+@pytest.mark.parametrize('datagrams', [False, True])
+def test_bytes_that_all_look_like_a_start_take_little_time(datagrams) -> None:
+    wire = Wire(1, None, datagrams=datagrams)
     began_s = time.process_time()
     wire.decode(b'\xfd' * 65_535)
     assert time.process_time() - began_s < 0.5

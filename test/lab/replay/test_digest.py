@@ -3,10 +3,13 @@
 """Heatmaps, decisions and set-points of the small bag, against those of an earlier version.
 
 ``small_digest.npz`` was written by version 3523282, then again when clearance began to count to the
-nearest corner of the obstacle (a site is found 0.5 s later, no heatmap changed). The networks'
-sums differ a little between processors. Where the checksums of all heatmaps are those of the
-stored version, decisions and set-points must be equal too; elsewhere heatmaps and states are
-compared with a tolerance.
+nearest corner of the obstacle (a site is found 0.5 s later), and when the safe altitude began to
+count from the lowest believed height (two steps of 231 change state one step earlier). No heatmap
+changed.
+
+The networks' sums differ a little between processors. Where the checksums of all heatmaps are
+those of the stored version, decisions and set-points must be equal too; elsewhere heatmaps and
+states are compared with a tolerance.
 ``python test_digest.py FILE`` writes what this version gives.
 """
 

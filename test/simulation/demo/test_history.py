@@ -163,6 +163,7 @@ def test_the_json_holds_what_the_issue_of_a_run_needs(tmp_path) -> None:
         'mirrored',
     }
     assert content['states'][0] == {'name': 'SEARCHING', 'seconds': 9.0}
+    (tmp_path / 'none').write_text('a file in place of a folder')
     with pytest.raises(RecordingError):
         summary.write(tmp_path / 'none' / 'summary.json')
 
