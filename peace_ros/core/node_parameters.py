@@ -164,12 +164,6 @@ class LandingOptions(ParameterSet):
         'With registration: take image (raw) or image/compressed (JPEG, PNG)',
         choices=_TRANSPORTS,
     )
-    vision_position: bool = parameter(
-        False,
-        'Tell the position filter of the autopilot how the vehicle moves, by camera and body rates '
-        '(100 Hz where vehicle.inertial_rate_hz is 0). What it does with that is set there; '
-        'nothing is switched by us',
-    )
     pose_source: str = parameter(
         'topic',
         'With interface twist: pose from the topic pose (PoseStamped), or from tf by the chain '
@@ -263,7 +257,6 @@ def groups_of(node: str) -> tuple[Group, ...]:
     if node == 'landing':
         from peace_ros.core.landing import LandingParameters
         from peace_ros.core.mapping import MapParameters
-        from peace_ros.core.odometry import OdometryParameters
         from peace_ros.core.vehicle import SenderParameters, VehicleParameters
 
         return (
@@ -272,7 +265,6 @@ def groups_of(node: str) -> tuple[Group, ...]:
             ('', CameraOptions),
             ('', LandingParameters),
             ('', MapParameters),
-            ('odometry', OdometryParameters),
             ('vehicle', VehicleParameters),
             ('sender', SenderParameters),
         )

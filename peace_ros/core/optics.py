@@ -99,17 +99,15 @@ def sample(
         because it is behind the camera or where the distortion is not one-to-one.
     """
     columns, rows = np.arange(size_wh[0])[None, :], np.arange(size_wh[1])[:, None]
-    x, y, z = directions
-    along = z[0] * columns + z[1] * rows + z[2]
-    seen = along > 0.0
+    x, y, z = (a * columns + b * rows + c for a, b, c in directions)
+    seen = z > 0.0
     if camera.distortion is None:
         pixels_from_grid = camera.matrix @ directions
         return [
             cv2.warpPerspective(each, pixels_from_grid, size_wh, flags=how | cv2.WARP_INVERSE_MAP)
             for each, how in pictures
         ], seen
-    across = (each[0] * columns + each[1] * rows + each[2] for each in (x, y))
-    seen &= sum(each * each for each in across) <= (widest_ray(camera) * along) ** 2
+    seen &= x * x + y * y <= (widest_ray(camera) * z) ** 2
     model = cv2.fisheye if camera.distortion.model == EQUIDISTANT else cv2
     # It maps the pixels of an undistorted picture. Its K may be any homography, so also the one
     # from directions to the grid.

@@ -32,7 +32,6 @@ from peace_ros.nodes.sending import Sending
 from peace_ros.nodes.status import DecisionPublisher, VehicleSituation
 from peace_ros.nodes.vehicle_access import VehicleAccess
 from peace_ros.nodes.view import LandingView
-from peace_ros.nodes.vision import VisionOutput
 
 
 class LandingNode(ManagedNode):
@@ -60,15 +59,16 @@ class LandingNode(ManagedNode):
         self._landing, self._state = self.filled(LandingParameters), State.IDLE
         self._core = self._create_core()
         self._publisher = DecisionPublisher(self)
-        self._vision = VisionOutput(self, self._options)
         self._access = VehicleAccess(self, self._options, self.filled(VehicleParameters))
         self._view = LandingView(self, self._options)
         self._inputs = LandingInputs(self, self._options)
         self.diagnostics.hardware_id = self._access.name
         self.diagnostics.add('landing', self._readiness)
         self._engagement = EngagementServices(self, self._access, auto=self._options.auto_engage)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)  # the ROS clock may stop or jump
+        # A ROS-time timer would stand still with a clock that stops or jumps.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0 / self._options.rate, self._step, clock=steady)
+        self.get_logger().info(f'waiting for the vehicle: {self._access.name}')
 
     def deactivate(self) -> None:
         """Stop the vehicle and engage no more."""
@@ -97,7 +97,7 @@ class LandingNode(ManagedNode):
         at_ns = self.clock_ns()
         with self._lock:
             link = self._access.link
-            self._inputs.feed(self._core, self._vision.poses(link))
+            self._inputs.feed(self._core, () if link is None else link.take_poses())
             told, age_s = newest_telemetry(link)
             decision = self._core.step(at_ns, told, age_s)
             self._submit(decision)
@@ -163,7 +163,7 @@ class LandingNode(ManagedNode):
         with self._lock:
             if self._sending.stop():
                 self._access.stop_vehicle()
-        for each in ('_vision', '_access', '_engagement'):
+        for each in ('_access', '_engagement'):
             if each in vars(self):
                 vars(self)[each].close()
 

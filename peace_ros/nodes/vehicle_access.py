@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 from geometry_msgs.msg import PoseStamped, Twist
@@ -27,8 +26,6 @@ from peace_ros.nodes.twist_link import TwistLink
 
 _TRY_S = 3.0
 """One attempt to hear an autopilot; between attempts the node says that it hears none."""
-_INERTIAL_HZ = 100.0
-"""With ``vision_position``, where no other rate is asked for."""
 _LAST_ZEROS = 3
 _STOP_S = 0.6
 """How long a vehicle that does not show its hold mode is asked for it again."""
@@ -54,8 +51,6 @@ class VehicleAccess:
             VehicleError: the connection or the dialect is not understood.
 
         """
-        if options.vision_position and parameters.inertial_rate_hz == 0.0:
-            parameters = replace(parameters, inertial_rate_hz=_INERTIAL_HZ)
         self._node = node
         self._parameters = parameters
         self._after = AfterHandover(
@@ -70,7 +65,6 @@ class VehicleAccess:
             self._subscribe_pose(options)
             return
         self.name = options.mavlink
-        node.get_logger().info(f'waiting for the vehicle: {self.name}')
         key_file, system_id = parameters.signing_key_file, parameters.system_id
         check_access(options.mavlink, options.dialect, key_file, system_id)
         timeout_s = min(_TRY_S, parameters.connect_timeout_s)

@@ -8,7 +8,6 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from math import hypot
 
 import numpy as np
@@ -18,14 +17,10 @@ from geometry_msgs.msg import PointStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from peace_ros.core.domain import Camera, ConfigurationError
 from peace_ros.nodes import qos
 from peace_ros.nodes.landing import LandingNode
-from peace_ros.nodes.messages import image_message
-from peace_ros.simulation import NadirCamera, draw_world
 from peace_ros.simulation.autopilot import AutopilotParameters, AutopilotSim, commands
 from peace_ros.simulation.autopilot.faults import inject
 
@@ -213,48 +208,6 @@ def test_lands_without_any_gnss_by_external_navigation(bench, hovering, engaging
     finally:
         tracker.stop()
     bench.until(lambda: hovering.mode_name == 'LAND', see)
-
-
-class Camera352:
-    """Publishes what a camera below the vehicle sees, ten times a second."""
-
-    def __init__(self, bench, node, sim) -> None:
-        self._eye = NadirCamera(draw_world(3, 160.0, 0.2), Camera.from_degrees(352, 352, 73.0))
-        self._out = bench.offer(Image, 'image', qos.IMAGE_OUT)
-        self._node, self._sim, self._due_s = node, sim, 0.0
-
-    def see(self) -> None:
-        if time.monotonic() < self._due_s:
-            return
-        self._due_s = time.monotonic() + 0.1
-        at_ns, pose = self._node.clock_ns(), self._sim.truth()
-        self._out.publish(image_message(self._eye.view(pose).image_rgb, 'rgb8', at_ns))
-
-
-@pytest.mark.parametrize('autopilot', ['ardupilot', 'px4'])
-def test_with_vision_position_the_autopilot_is_told_how_it_moves(
-    bench, hovering, autopilot
-) -> None:
-    hovering.parameters = replace(hovering.parameters, speed=1.0)
-    found = bench.findings('vision')
-    node = bench.run(LandingNode, mavlink=hovering.tcp_url, vision_position=True)
-    camera = Camera352(bench, node, hovering)
-    bench.until(lambda: bool(found) and found[-1].level == b'\x00', camera.see, within_s=60.0)
-    inject(hovering, 'gps_loss')
-    if autopilot == 'ardupilot':
-        hovering.flight.estimator.use_source(2)
-    bench.until(lambda: hovering.flight.estimator.source == 2, camera.see)
-    since_s = time.monotonic()
-    bench.until(lambda: time.monotonic() > since_s + 8.0, camera.see)
-    assert hovering.flight.has_position, 'dead reckoning ends after 5.4 or 7.1 s'
-    at, truth = hovering.flight.position_m, hovering.truth()
-    assert hypot(at[0] - truth.north_m, at[1] - truth.east_m) < 1.0
-
-
-@pytest.mark.parametrize('wrong', [{'interface': 'twist'}, {'mount_source': 'tf'}])
-def test_vision_position_is_refused_where_it_cannot_be(bench, wrong) -> None:
-    with pytest.raises(ConfigurationError, match='vision_position'):
-        bench.run(LandingNode, vision_position=True, **wrong)
 
 
 def test_without_a_position_it_says_so_and_holds_level(bench, hovering, engaging) -> None:

@@ -16,7 +16,6 @@ BLOCKED_IN = {
     'core.inference': ['rclpy', 'torch', 'pymavlink'],
     'core.segmentation': ['rclpy', 'torch', 'pymavlink'],
     'core.mapping': ['rclpy', 'torch', 'pymavlink', 'onnxruntime'],
-    'core.odometry': ['rclpy', 'torch', 'pymavlink', 'onnxruntime'],
     'core.landing': ['rclpy', 'torch', 'pymavlink', 'onnxruntime'],
     'core.vehicle': ['rclpy', 'torch', 'onnxruntime', 'cv2'],
     'simulation': ['rclpy', 'torch', 'pymavlink', 'onnxruntime'],

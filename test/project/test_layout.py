@@ -11,13 +11,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'peace_ros'
-LINES_OF_WHAT_FLIES = 21_290
+LINES_OF_WHAT_FLIES = 19_280
 """Of core and nodes: 14,500, what learns a biased velocity and finds faulty axes, what names the
 cause that stops the vehicle (fence, second commander, failsafe after a silent line), what compares
 heights, what knows lens, mount, gimbal, shape and encodings of the camera, diagnostics of every
 input, live parameters, managed nodes that may share a process, what people see, a search lower
-down, the parameters of the flight recorder, why places are refused, and the odometry (2,000 with
-its messages), which says how the vehicle moves without GNSS."""
+down, the parameters of the flight recorder, and why places are refused."""
 LINES_OF_A_NODE_FILE = 200
 
 

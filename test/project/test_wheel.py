@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LIMIT_BYTES = 1_100_000
+LIMIT_BYTES = 1_000_000
 OF_A_CHECKOUT = ('peace_ros/lab/training/', 'peace_ros/lab/damage/')
 BUILD = """
 import sys

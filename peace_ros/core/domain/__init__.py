@@ -22,7 +22,6 @@ from peace_ros.core.domain.motion import (
     Site,
     Telemetry,
 )
-from peace_ros.core.domain.odometry import InertialSample, MotionEstimate
 from peace_ros.core.domain.perception import DepthImage, Frame, Heatmap, Prompt, RankedWord
 
 __all__ = [
@@ -39,10 +38,8 @@ __all__ = [
     'Heatmap',
     'HeightReport',
     'ImageError',
-    'InertialSample',
     'Label',
     'Level',
-    'MotionEstimate',
     'Mount',
     'PeaceError',
     'Pose',

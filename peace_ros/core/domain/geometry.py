@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import acos, atan2, cos, radians, sin, sqrt
+from math import acos, atan2, cos, radians, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,15 +69,6 @@ def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> 
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
     )
-
-
-def quaternion_from_rotation_vector(rotation: NDArray[np.float64]) -> Quaternion:
-    """Return the rotation about a vector (3,), by its length in radians."""
-    x, y, z = (float(part) for part in rotation)
-    angle = sqrt(x * x + y * y + z * z)
-    # sin(angle / 2) / angle, of which the first two terms of the series are exact near 0.
-    scale = 0.5 - angle**2 / 48.0 if angle < 1e-4 else sin(0.5 * angle) / angle
-    return cos(0.5 * angle), scale * x, scale * y, scale * z
 
 
 def yaw_from_quaternion(q: Quaternion) -> float:

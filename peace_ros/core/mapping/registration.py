@@ -91,11 +91,11 @@ class Mismatch(Enum):
     DIFFERENT = 'the pictures do not agree'
 
 
-def small_grey(image_rgb: NDArray[np.uint8], longest_px: int = VIEW_PX) -> NDArray[np.uint8]:
-    """Return a height x width x 3 RGB image as a grey one whose longer edge is limited."""
+def small_grey(image_rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a height x width x 3 RGB image as a grey one whose longer edge is VIEW_PX at most."""
     grey = cv2.cvtColor(image_rgb, cv2.COLOR_RGB2GRAY)
     height, width = grey.shape
-    scale = longest_px / max(height, width)
+    scale = VIEW_PX / max(height, width)
     if scale < 1.0:
         size = (max(1, round(width * scale)), max(1, round(height * scale)))
         grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)

@@ -27,8 +27,6 @@ from peace_ros.core.vehicle.heights import (
     OtherHeights,
     height_of,
 )
-from peace_ros.core.vehicle.inertial import MESSAGES as INERTIAL
-from peace_ros.core.vehicle.inertial import InertialIntake
 from peace_ros.core.vehicle.parameters import VehicleParameters
 from peace_ros.core.vehicle.stops import MESSAGES, Stops
 from peace_ros.core.vehicle.texts import StatusTexts
@@ -47,8 +45,6 @@ IN_ORDER = frozenset(
 )
 """Of these only the newest is used, in whatever order they are received."""
 FARTHEST_M, HIGHEST_MM, FASTEST_M_S, TURN_RAD = 1e6, 2e7, 100.0, 7.0
-STRONGEST_M_S2, FASTEST_RAD_S = 160.0, 35.0
-"""Accelerometers of autopilots measure up to 16 g, their gyroscopes up to 2000 deg/s."""
 LIMITS: dict[str, tuple[tuple[str, float], ...]] = {
     'LOCAL_POSITION_NED': (
         *((axis, FARTHEST_M) for axis in 'xyz'),
@@ -61,10 +57,6 @@ LIMITS: dict[str, tuple[tuple[str, float], ...]] = {
     'GLOBAL_POSITION_INT': (('relative_alt', HIGHEST_MM),),
     'GPS_RAW_INT': (('alt', HIGHEST_MM),),
     'TERRAIN_REPORT': (('current_height', FARTHEST_M),),
-    'HIGHRES_IMU': (
-        *((f'{axis}acc', STRONGEST_M_S2) for axis in 'xyz'),
-        *((f'{axis}gyro', FASTEST_RAD_S) for axis in 'xyz'),
-    ),
 }
 """Fields that must be numbers, and the largest size of each that a multicopter can reach."""
 
@@ -92,7 +84,6 @@ class Assembler:
         self._clock = clock or TimeMap()
         self._watch = JumpWatch(parameters.jump_limit_m)
         self.poses: deque[Pose] = deque(maxlen=MAX_POSES)
-        self.inertial = InertialIntake(self._clock)
         self.texts = StatusTexts()
         self.rejected = 0
         """Messages with values that are not numbers, or with attitudes that are not rotations."""
@@ -174,11 +165,6 @@ class Assembler:
     def yaw_rad(self) -> float:
         """Newest heading, NED; it needs no position."""
         return self._yaw_rad
-
-    @property
-    def has_gnss_fix(self) -> bool:
-        """A GNSS receiver has a 3D fix."""
-        return self._gnss.has_fix
 
     @property
     def home_msl_m(self) -> float | None:
@@ -418,9 +404,6 @@ class Assembler:
         if whole and m.severity <= mavlink.MAV_SEVERITY_WARNING:
             self.stops.take_text(self.texts.newest, steady_ns)
 
-    def _take_inertial(self, m: Any, stamp_ns: int, _steady_ns: int) -> None:
-        self.inertial.take(m, stamp_ns)
-
     def _take_stop(self, m: Any, _stamp_ns: int, steady_ns: int) -> None:
         self.stops.take(m, steady_ns)
 
@@ -470,5 +453,4 @@ _HANDLERS = {
     GIMBAL: Assembler._take_gimbal,  # noqa: SLF001
     'STATUSTEXT': Assembler._text,  # noqa: SLF001
     **dict.fromkeys(MESSAGES, Assembler._take_stop),  # noqa: SLF001
-    **dict.fromkeys(INERTIAL, Assembler._take_inertial),  # noqa: SLF001
 }

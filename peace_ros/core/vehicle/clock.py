@@ -94,27 +94,17 @@ class TimeMap:
         drifts = max(quick) - min(quick) > STEP_NS + limit_ns
         self._offset_ns = None if drifts else round(median(quick))
 
-    def moment_ns(self, since_boot_ns: int, received_ns: int) -> int | None:
-        """Return the node clock of a moment of the autopilot's, None where it is not known.
-
-        Args:
-            since_boot_ns: The autopilot's clock.
-            received_ns: Node clock when the message about it was received.
-        """
-        if self._offset_ns is None or self._deviating:
-            return None
-        mapped_ns = since_boot_ns + self._offset_ns
-        fits = received_ns - OLDEST_NS <= mapped_ns <= received_ns + AHEAD_NS
-        return min(mapped_ns, received_ns) if fits else None
-
     def stamp_ns(self, boot_ms: int, received_ns: int, series: str = '') -> int:
         """Return the node clock of a moment of the autopilot's; stamps of a series never go back.
 
         Where the offset is unknown or in doubt, or gives a moment in the future or long ago, it is
         the moment of receipt: a simulation that stood still for a moment has lost that time.
         """
-        mapped_ns = self.moment_ns(boot_ms * 1_000_000, received_ns)
-        stamp_ns = received_ns if mapped_ns is None else mapped_ns
+        stamp_ns = received_ns
+        if self._offset_ns is not None and not self._deviating:
+            mapped_ns = boot_ms * 1_000_000 + self._offset_ns
+            if received_ns - OLDEST_NS <= mapped_ns <= received_ns + AHEAD_NS:
+                stamp_ns = min(mapped_ns, received_ns)
         last_ns = self._last_stamp_ns.get(series, 0)
         if received_ns < last_ns - OLDEST_NS:
             last_ns = 0  # our own clock stepped back

@@ -15,8 +15,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from peace_ros.core.domain.errors import VehicleError
 from peace_ros.core.domain.geometry import rotation_matrix
 from peace_ros.core.domain.motion import Pose, Setpoint
-from peace_ros.core.domain.odometry import MotionEstimate
-from peace_ros.core.vehicle.vision import odometry_message, vision_messages
 
 VELOCITY_HOLD_HEADING = 0x5C7
 """Type mask: use velocity and yaw rate (which is zero), ignore everything else.
@@ -48,8 +46,6 @@ class Dialect(ABC):
     """Message id that tells what its position filter knows."""
     height_message: int
     """Message id of a height above home that needs no position."""
-    inertial_message: int = mavlink.MAVLINK_MSG_ID_HIGHRES_IMU
-    """Message id of body rates and accelerations."""
     streams_before_control: bool = False
     """Set-points must flow before the mode that obeys them is entered."""
     level_mode: str = ''
@@ -73,10 +69,6 @@ class Dialect(ABC):
     @abstractmethod
     def landing_target_message(self, site_ned_m: Vector, pose: Pose, stamp_us: int) -> Any:
         """Return LANDING_TARGET for a point on the ground, local NED, in a frame it takes."""
-
-    def motion_messages(self, estimate: MotionEstimate) -> list[Any]:
-        """Return what tells the position filter how the vehicle moves: by default ODOMETRY."""
-        return [odometry_message(estimate)]
 
     def velocity_message(self, setpoint: Setpoint, boot_ms: int, target: tuple[int, int]) -> Any:
         """Return SET_POSITION_TARGET_LOCAL_NED to (system, component), heading held."""
@@ -142,7 +134,6 @@ class ArduPilot(Dialect):
     level_mode: str = 'GUIDED_NOGPS'
     estimator_message: int = 193
     height_message: int = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
-    inertial_message: int = mavlink.MAVLINK_MSG_ID_RAW_IMU
 
     def mode_name(self, custom_mode: int) -> str:
         """Return e.g. GUIDED; MODE 99 for one that is not known."""
@@ -158,10 +149,6 @@ class ArduPilot(Dialect):
         """Return LANDING_TARGET in BODY_FRD, the frame of its precision landing."""
         body_m = _from_body(site_ned_m, pose)
         return _landing_target(mavlink.MAV_FRAME_BODY_FRD, body_m, body_m, stamp_us)
-
-    def motion_messages(self, estimate: MotionEstimate) -> list[Any]:
-        """Return VISION_POSITION_ESTIMATE and VISION_SPEED_ESTIMATE, each with its own stamp."""
-        return vision_messages(estimate)
 
 
 PX4_MODES: dict[str, tuple[int, int]] = {

@@ -30,11 +30,6 @@ class GnssWatch:
         self.fix_note = ''
         """That there is no 3D fix, empty while there is one or nothing is known."""
 
-    @property
-    def has_fix(self) -> bool:
-        """A receiver has a 3D fix, and had it in the message before."""
-        return self._relied and self._lost_ms is None
-
     def take(self, receiver: str, fix_type: int, boot_ms: int, *, known: bool | None) -> None:
         """Take what a receiver says.
 

@@ -16,7 +16,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from peace_ros.core.domain.errors import VehicleError
 from peace_ros.core.domain.geometry import lean_acceleration
 from peace_ros.core.domain.motion import Pose, Setpoint, Telemetry
-from peace_ros.core.domain.odometry import InertialSample, MotionEstimate
 from peace_ros.core.threads import GuardedThread, OnDefect, print_defect
 from peace_ros.core.vehicle.assembler import Assembler
 from peace_ros.core.vehicle.clock import TimeMap
@@ -32,7 +31,6 @@ from peace_ros.core.vehicle.result import Answer, LineCounts, RequestResult
 from peace_ros.core.vehicle.signing import Signer
 from peace_ros.core.vehicle.streams import StreamKeeper
 from peace_ros.core.vehicle.transport import Source
-from peace_ros.core.vehicle.vision import check_motion
 from peace_ros.core.vehicle.wire import Wire
 
 READ_S = 0.02
@@ -175,30 +173,6 @@ class MavlinkLink:
             poses = list(self._heard().poses)
             self._heard().poses.clear()
             return poses
-
-    @property
-    def has_gnss_fix(self) -> bool:
-        """A GNSS receiver has a 3D fix; the position may come from another source nevertheless."""
-        with self._changed:
-            return self._heard().has_gnss_fix
-
-    def take_inertial(self) -> list[InertialSample]:
-        """Return body rates and accelerations since the last call, oldest first (at most 512).
-
-        They come at ``inertial_rate_hz``, once the clock offset to the autopilot is known.
-        """
-        with self._changed:
-            return self._heard().inertial.drain()
-
-    def send_motion(self, estimate: MotionEstimate) -> None:
-        """Tell the position filter of the autopilot how the vehicle moves.
-
-        Raises:
-            VehicleError: A number is not finite, or the line broke.
-        """
-        check_motion(estimate)
-        for message in self.dialect.motion_messages(estimate):
-            self._send(message)
 
     def status_texts(self) -> list[str]:
         """Return the newest STATUSTEXTs, oldest first (at most 50)."""

@@ -39,14 +39,6 @@ class VehicleParameters(ParameterSet):
     state_rate_hz: float = parameter(
         5.0, 'Rate of EXTENDED_SYS_STATE.', unit='Hz', low=1.0, high=20.0
     )
-    inertial_rate_hz: float = parameter(
-        0.0,
-        'Rate of the message with body rates and accelerations, which odometry needs (RAW_IMU of '
-        'ArduPilot, HIGHRES_IMU of PX4): 50 Hz or more; 0: it is not asked for.',
-        unit='Hz',
-        low=0.0,
-        high=400.0,
-    )
     altitude_source: str = parameter(
         'home',
         'Altitude above ground: above home, or by a downward rangefinder while it is in range.',

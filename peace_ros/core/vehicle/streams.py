@@ -62,8 +62,6 @@ class StreamKeeper:
         """Message id -> the rate that is asked for."""
         if dialect.heartbeat_rate_hz > 0.0:
             self.rates_hz[mavlink.MAVLINK_MSG_ID_HEARTBEAT] = dialect.heartbeat_rate_hz
-        if parameters.inertial_rate_hz > 0.0:
-            self.rates_hz[dialect.inertial_message] = parameters.inertial_rate_hz
         self._optional = {*MAYBE}
         if parameters.altitude_source == 'rangefinder':
             self.rates_hz[mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR] = parameters.pose_rate_hz

@@ -248,8 +248,7 @@ class AutopilotSim:
         )
         errors = EstimateErrors(sizes, p.seed)
         gnss = GnssAltitudeError(p.gnss_altitude_noise_m, p.seed)
-        store, vision = self._parameter_store, (p.vision_delay_s, p.seed)
-        return Flight(physics, self._personality, p.datum, errors, gnss, store, *vision)
+        return Flight(physics, self._personality, p.datum, errors, gnss, self._parameter_store)
 
     def _note_altitude(self) -> None:
         altitude_m = -self._flight.physics.down_m

@@ -106,8 +106,6 @@ def _take_off(flight: Flight, c: VehicleCommand) -> Result:
 
 
 def _source(flight: Flight, c: VehicleCommand) -> Result:
-    if flight.personality.is_px4:
-        return Result.UNSUPPORTED
     return Result.ACCEPTED if flight.estimator.use_source(int(c.value(0))) else Result.DENIED
 
 
@@ -240,19 +238,6 @@ def _attitude_target(flight: Flight, m: Any) -> None:
     flight.take_attitude(lean, atan2(r[1, 0], r[0, 0]), max(0.0, min(1.0, m.thrust)))
 
 
-def _odometry(flight: Flight, m: Any) -> None:
-    """Take ODOMETRY in the frames in which a flight was measured with each autopilot."""
-    px4 = (mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_LOCAL_NED)
-    ardupilot = (mavlink.MAV_FRAME_LOCAL_FRD, mavlink.MAV_FRAME_BODY_FRD)
-    if (m.frame_id, m.child_frame_id) != (px4 if flight.personality.is_px4 else ardupilot):
-        return
-    velocity = [m.vx, m.vy, m.vz]
-    if not flight.personality.is_px4:
-        velocity = list(rotation_matrix((m.q[0], m.q[1], m.q[2], m.q[3])) @ velocity)
-    flight.estimator.see(flight.time_s, (m.x, m.y), m.reset_counter)
-    flight.estimator.see_velocity(flight.time_s, (float(velocity[0]), float(velocity[1])))
-
-
 def _old_set_mode(flight: Flight, m: Any) -> None:
     if m.base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
         packed = m.custom_mode
@@ -269,11 +254,5 @@ _MESSAGES: dict[int, Callable[[Flight, Any], None]] = {
     mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: _attitude_target,
     mavlink.MAVLINK_MSG_ID_SET_MODE: _old_set_mode,
     mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: lambda flight, _: flight.estimator.give_origin(),
-    mavlink.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE: lambda flight, m: flight.estimator.see(
-        flight.time_s, (m.x, m.y), m.reset_counter
-    ),
-    mavlink.MAVLINK_MSG_ID_VISION_SPEED_ESTIMATE: lambda flight, m: flight.estimator.see_velocity(
-        flight.time_s, (m.x, m.y)
-    ),
-    mavlink.MAVLINK_MSG_ID_ODOMETRY: _odometry,
+    mavlink.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE: lambda flight, m: flight.see((m.x, m.y, m.z)),
 }

@@ -23,7 +23,6 @@ from peace_ros.simulation.autopilot.estimator import RECKONS_PX4_S, RECKONS_S, E
 from peace_ros.simulation.autopilot.fence import Fence
 from peace_ros.simulation.autopilot.guided import PlaceTarget, PositionTarget
 from peace_ros.simulation.autopilot.modes import RULES, LandedState, Mode, Result, Severity
-from peace_ros.simulation.autopilot.navigation import ExternalNavigation, Plane
 from peace_ros.simulation.autopilot.parameter_store import (
     CRUISE_SPEED,
     RTL_ALTITUDE,
@@ -59,16 +58,12 @@ class Flight:
         errors: EstimateErrors | None = None,
         gnss: GnssAltitudeError | None = None,
         parameters: ParameterStore | None = None,
-        vision_delay_s: float = 0.05,
-        seed: int = 0,
     ) -> None:
         self.physics = physics
         self.personality = personality or Personality()
         self.datum = datum or Datum()
         self.parameters = parameters or ParameterStore(self.personality)
-        reckons_s = RECKONS_PX4_S if self.personality.is_px4 else RECKONS_S
-        navigation = ExternalNavigation(vision_delay_s, seed, reckons_s)
-        self.estimator = Estimator(reckons_s, navigation, chooses=self.personality.is_px4)
+        self.estimator = Estimator(RECKONS_PX4_S if self.personality.is_px4 else RECKONS_S)
         self.errors = errors or EstimateErrors()
         self.barometer = BarometerError()
         self.gnss = gnss or GnssAltitudeError(0.0)
@@ -114,7 +109,7 @@ class Flight:
             return self._last_position_m
         offset, wrong = self.estimator.offset_m, self.errors.position_m
         north, east, down = self._truth
-        down -= self.barometer.height_m
+        down += offset[2] - self.barometer.height_m
         return north + offset[0] + wrong[0], east + offset[1] + wrong[1], down
 
     @property
@@ -123,17 +118,8 @@ class Flight:
         north, east, down = self.physics.velocity_ned_m_s
         if self.physics.on_ground:
             return north, east, down  # a filter knows when it is at rest
-        wrong = self._wrong_m_s
+        wrong = self.errors.velocity_m_s
         return north + wrong[0], east + wrong[1], down - self.barometer.climb_m_s
-
-    @property
-    def attitude_rad(self) -> tuple[float, float, float]:
-        """Roll, pitch and yaw as the filter estimates them."""
-        p = self.physics
-        if p.on_ground:
-            return p.roll_rad, p.pitch_rad, p.yaw_rad
-        roll, pitch = self.estimator.tilt_offset_rad(p.yaw_rad)
-        return p.roll_rad + roll, p.pitch_rad + pitch, p.yaw_rad
 
     @property
     def last_place_m(self) -> tuple[float, float, float]:
@@ -161,15 +147,6 @@ class Flight:
         return None if self._setpoint_s is None else self.time_s - self._setpoint_s
 
     @property
-    def _wrong_m_s(self) -> Plane:
-        """Velocity, estimate minus truth."""
-        (north, east), (more_north, more_east) = (
-            self.errors.velocity_m_s,
-            self.estimator.velocity_offset_m_s,
-        )
-        return north + more_north, east + more_east
-
-    @property
     def _truth(self) -> tuple[float, float, float]:
         return self.physics.north_m, self.physics.east_m, self.physics.down_m
 
@@ -180,8 +157,7 @@ class Flight:
         self.barometer.step(dt_s)
         self._steering.height_error_m = self.barometer.height_m
         self.gnss.step(dt_s)
-        truth_m_s = self.physics.velocity_ned_m_s
-        failsafe = self.estimator.step(self.time_s, self._truth[:2], truth_m_s[:2])
+        failsafe = self.estimator.step(self.time_s)
         if self.has_position:
             self._last_position_m = self.position_m
         self._tell_readiness()
@@ -215,7 +191,7 @@ class Flight:
         Measured, PX4 v1.17-alpha: told 0.7 m/s it reports 0.45 m/s and hardly moves. In the same
         way a height that glides up lets the vehicle sink; that it does was not measured.
         """
-        north, east = self._wrong_m_s
+        north, east = self.errors.velocity_m_s
         return replace(
             command,
             v_north_m_s=command.v_north_m_s - north,
@@ -372,6 +348,10 @@ class Flight:
         """Take SET_ATTITUDE_TARGET, which only GUIDED_NOGPS obeys."""
         if self.mode is Mode.GUIDED_NOGPS:
             self._steering.take_attitude(lean_rad, yaw_rad, thrust)
+
+    def see(self, seen_m: tuple[float, float, float]) -> None:
+        """Take a position of external navigation."""
+        self.estimator.see(self.time_s, seen_m, self._truth)
 
     def turn_stick(self, yaw_rate_rad_s: float) -> None:
         """Move the pilot's yaw stick: it turns the vehicle in GUIDED too."""

@@ -7,7 +7,7 @@ All values come from the physics; the noise of real sensors is left out.
 
 from __future__ import annotations
 
-from math import atan2, cos, degrees, hypot, radians
+from math import atan2, cos, degrees, hypot, radians, sin
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ def highres_imu(flight: Flight) -> Any:
     return mavlink.MAVLink_highres_imu_message(
         round(flight.time_s * 1e6),
         *force,
-        *flight.physics.body_rates_rad_s,
+        *_rates(flight.physics),
         *field,
         pressure_hpa,
         0.0,
@@ -50,7 +50,7 @@ def raw_imu(flight: Flight) -> Any:
     return mavlink.MAVLink_raw_imu_message(
         round(flight.time_s * 1e6),
         *(round(each / GRAVITY_M_S2 * 1000.0) for each in force),
-        *(round(each * 1000.0) for each in flight.physics.body_rates_rad_s),
+        *(round(each * 1000.0) for each in _rates(flight.physics)),
         *(round(each * 1000.0) for each in field),
     )
 
@@ -117,7 +117,19 @@ def _body(p: Physics) -> tuple[list[float], list[float]]:
     """Return specific force (m/s^2) and magnetic field (Gauss) along forward, right, down."""
     to_ned = rotation_matrix(p.quaternion_ned_frd)
     field = [float(each) for each in to_ned.T @ np.array(FIELD_GAUSS)]
-    return list(p.specific_force_m_s2), field
+    # The thrust of a multicopter acts along its own vertical axis only.
+    lift = GRAVITY_M_S2 if p.on_ground else GRAVITY_M_S2 / max(0.3, cos(p.tilt_rad))
+    return [0.0, 0.0, -lift], field
+
+
+def _rates(p: Physics) -> tuple[float, float, float]:
+    """Return the turn about forward, right and down, rad/s."""
+    rate, pitch = p.yaw_rate_rad_s, p.pitch_rad
+    return (
+        -rate * sin(pitch),
+        rate * cos(pitch) * sin(p.roll_rad),
+        rate * cos(pitch) * cos(p.roll_rad),
+    )
 
 
 def _air(flight: Flight) -> tuple[float, float]:

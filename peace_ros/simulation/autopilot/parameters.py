@@ -109,14 +109,6 @@ class AutopilotParameters(ParameterSet):
         low=0.0,
         high=20.0,
     )
-    vision_delay_s: float = parameter(
-        0.05,
-        'External navigation belongs to the moment so long before it comes (VISO_DELAY_MS of '
-        'ArduPilot, EKF2_EV_DELAY of PX4).',
-        unit='s',
-        low=0.0,
-        high=0.25,
-    )
     has_gimbal: bool = parameter(
         False, 'A gimbal keeps the camera level with the horizon and reports its attitude.'
     )

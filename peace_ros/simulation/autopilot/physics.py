@@ -14,11 +14,7 @@ from math import atan2, copysign, cos, exp, hypot, pi, radians, sin, sqrt, tan
 from random import Random
 
 from peace_ros.core.domain.camera import Quaternion
-from peace_ros.core.domain.geometry import (
-    multiply,
-    quaternion_from_euler,
-    rotation_matrix,
-)
+from peace_ros.core.domain.geometry import quaternion_from_euler
 
 GRAVITY_M_S2 = 9.80665
 DRAG_PER_M = GRAVITY_M_S2 * tan(radians(22.0)) / 8.0**2
@@ -140,8 +136,6 @@ class Physics:
         self.roll_rad = 0.0
         self.pitch_rad = 0.0
         self.touchdown_speed_m_s = 0.0
-        self._before = (MAX_STEP_S, (0.0, 0.0, heading_rad), (0.0, 0.0, 0.0))
-        """Length of the last step; roll, pitch and yaw, and velocity, before it."""
         self._wind = wind_to_m_s
         self._gust_m_s = gust_m_s
         self._gust = (0.0, 0.0)
@@ -177,32 +171,8 @@ class Physics:
         """Angle between body-down and down."""
         return atan2(sqrt(tan(self.roll_rad) ** 2 + tan(self.pitch_rad) ** 2), 1.0)
 
-    @property
-    def body_rates_rad_s(self) -> tuple[float, float, float]:
-        """Angular velocity about forward, right, down, over the last step."""
-        span_s, angles, _ = self._before
-        w, x, y, z = quaternion_from_euler(*angles)
-        turn = multiply((w, -x, -y, -z), self.quaternion_ned_frd)
-        scale = copysign(2.0, turn[0]) / span_s
-        return scale * turn[1], scale * turn[2], scale * turn[3]
-
-    @property
-    def specific_force_m_s2(self) -> tuple[float, float, float]:
-        """What accelerometers measure over the last step: forward, right, down."""
-        span_s, _, (north, east, down) = self._before
-        v_north, v_east, v_down = self.velocity_ned_m_s
-        felt = (
-            (v_north - north) / span_s,
-            (v_east - east) / span_s,
-            (v_down - down) / span_s - GRAVITY_M_S2,
-        )
-        forward, right, below = rotation_matrix(self.quaternion_ned_frd).T @ felt
-        return float(forward), float(right), float(below)
-
     def step(self, dt_s: float, command: VelocityCommand) -> None:
         """Advance by dt_s, in parts of at most 10 ms."""
-        angles = (self.roll_rad, self.pitch_rad, self.yaw_rad)
-        self._before = (dt_s, angles, self.velocity_ned_m_s)
         parts = max(1, round(dt_s / MAX_STEP_S + 0.499))
         for _ in range(parts):
             self._step_once(dt_s / parts, command)

@@ -10,7 +10,6 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from peace_ros.core.domain.geometry import quaternion_from_euler
 from peace_ros.simulation.autopilot import instruments
 from peace_ros.simulation.autopilot.disturbance import Disturbance, Vector
 from peace_ros.simulation.autopilot.estimator import READY_S
@@ -158,14 +157,15 @@ class Streams:
         )
 
     def _attitude(self, flight: Flight) -> Any:
+        p = flight.physics
         return mavlink.MAVLink_attitude_message(
-            self._boot_ms(flight), *flight.attitude_rad, *flight.physics.body_rates_rad_s
+            self._boot_ms(flight), p.roll_rad, p.pitch_rad, p.yaw_rad, 0.0, 0.0, p.yaw_rate_rad_s
         )
 
     def _attitude_quaternion(self, flight: Flight) -> Any:
-        attitude = quaternion_from_euler(*flight.attitude_rad)
+        p = flight.physics
         return mavlink.MAVLink_attitude_quaternion_message(
-            self._boot_ms(flight), *attitude, *flight.physics.body_rates_rad_s
+            self._boot_ms(flight), *p.quaternion_ned_frd, 0.0, 0.0, p.yaw_rate_rad_s
         )
 
     def _global_position_int(self, flight: Flight) -> Any:

@@ -26,7 +26,6 @@ from peace_ros.core.domain.geometry import (
     ned_to_enu,
     optical_from_mount,
     quaternion_from_euler,
-    quaternion_from_rotation_vector,
     rotation_matrix,
     slerp,
     yaw_from_quaternion,
@@ -226,22 +225,3 @@ def test_the_mount_by_parameters_and_by_an_optical_frame_are_the_same() -> None:
     ahead = mount_from_optical((0.5, -0.5, 0.5, -0.5), NOWHERE)
     by_parameters = mount_from_degrees((0.0, 90.0, 0.0), NOWHERE)
     assert ahead.quaternion == pytest.approx(by_parameters.quaternion)
-
-
-@given(ANGLES, TILTS, TILTS)
-def test_a_rotation_vector_turns_about_itself_by_its_length(x, y, z):
-    vector = np.array([x, y, z])
-    turned = rotation_matrix(quaternion_from_rotation_vector(vector))
-    assert turned @ vector == pytest.approx(vector, abs=1e-9)
-    angle = float(np.linalg.norm(vector))
-    assert np.trace(turned) == pytest.approx(1.0 + 2.0 * np.cos(angle), abs=1e-9)
-
-
-@pytest.mark.parametrize('angle', [0.0, 1e-9, 9e-5, 1.1e-4, 0.3, -2.0])
-@pytest.mark.parametrize('axis', [0, 1, 2])
-def test_a_rotation_about_an_axis_is_that_angle(axis, angle):
-    vector, angles = np.zeros(3), [0.0, 0.0, 0.0]
-    vector[axis] = angles[axis] = angle
-    assert quaternion_from_rotation_vector(vector) == pytest.approx(
-        quaternion_from_euler(*angles), abs=1e-12
-    )

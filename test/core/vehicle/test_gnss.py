@@ -17,18 +17,6 @@ def watch():
     return watch
 
 
-def test_a_fix_counts_from_the_second_message_on():
-    watch = GnssWatch()
-    assert not watch.has_fix
-    watch.take(FIRST, 1, 0, known=True)
-    watch.take(FIRST, 3, 100, known=True)
-    assert not watch.has_fix
-    watch.take(FIRST, 3, 200, known=True)
-    assert watch.has_fix
-    watch.take(FIRST, 1, 300, known=True)
-    assert not watch.has_fix
-
-
 @pytest.mark.parametrize('fix_type', [0, 1, 2])
 def test_the_first_message_below_3d_counts(watch, fix_type):
     watch.take(FIRST, fix_type, 200, known=True)

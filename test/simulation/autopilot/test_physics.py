@@ -4,13 +4,11 @@
 
 from math import degrees, isclose, pi
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from peace_ros.core.domain.geometry import rotation_matrix
-from peace_ros.simulation.autopilot.physics import GRAVITY_M_S2, Physics, VelocityCommand
+from peace_ros.simulation.autopilot.physics import Physics, VelocityCommand
 
 DT_S = 0.01
 TOLERANCE = 0.15
@@ -126,28 +124,3 @@ def test_reaches_any_velocity_and_stands_still_on_zero(north, east, down, dt_s):
     for _ in range(round(8.0 / dt_s)):
         physics.step(dt_s, VelocityCommand())
     assert physics.velocity_ned_m_s == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
-
-
-def test_an_inertial_unit_measures_what_the_vehicle_does():
-    """Its rates and forces, integrated, give attitude and velocity."""
-    physics = flying(heading_rad=0.4)
-    physics.set_wind((4.0, -2.0), 0.0)
-    turned, velocity = rotation_matrix(physics.quaternion_ned_frd), np.zeros(3)
-    commands = (VelocityCommand(3.0, 1.0, 1.0, yaw_rate_rad_s=0.5), VelocityCommand(0.0, -2.0))
-    for command in commands:
-        for _ in range(200):
-            physics.step(DT_S, command)
-            p, q, r = DT_S * np.array(physics.body_rates_rad_s)
-            turned = turned @ (np.eye(3) + np.array([[0.0, -r, q], [r, 0.0, -p], [-q, p, 0.0]]))
-            force = rotation_matrix(physics.quaternion_ned_frd) @ physics.specific_force_m_s2
-            velocity = velocity + DT_S * (force + np.array([0.0, 0.0, GRAVITY_M_S2]))
-        assert turned == pytest.approx(rotation_matrix(physics.quaternion_ned_frd), abs=0.01)
-        assert velocity == pytest.approx(physics.velocity_ned_m_s, abs=1e-6)
-    assert np.hypot(*physics.specific_force_m_s2[:2]) > 0.3
-
-
-def test_a_vehicle_that_stands_measures_gravity_only():
-    physics = Physics()
-    physics.step(DT_S, VelocityCommand())
-    assert physics.body_rates_rad_s == (0.0, 0.0, 0.0)
-    assert physics.specific_force_m_s2 == pytest.approx((0.0, 0.0, -GRAVITY_M_S2))

@@ -122,7 +122,7 @@ def test_local_position_is_silent_before_the_origin_and_after_gps_loss(gcs, sim)
     assert 'LOCAL_POSITION_NED' not in gcs.kinds(2.0)
 
 
-@pytest.mark.parametrize('number', [30, 31, 33, 245, 1, 148, 24, 242, 27])
+@pytest.mark.parametrize('number', [30, 31, 33, 245, 1, 148, 24, 242])
 def test_answers_requests_for_a_message(gcs, number):
     gcs.hear(45.0)
     gcs.command(512, number)
