@@ -22,7 +22,8 @@ pytestmark = pytest.mark.integration
 
 LIMIT_S = 280.0
 SEED = 2
-NODES = ('autopilot_sim', 'satellite_view', 'prompt_generator', 'segmentation', 'landing')
+FLYING = ('prompt_generator', 'segmentation', 'landing')
+NODES = ('autopilot_sim', 'satellite_view', 'recorder', *FLYING)
 
 
 def start_demo(run_dir: Path, *options: str) -> subprocess.Popen[str]:
