@@ -63,6 +63,17 @@ class PeaceNode(Node):  # type: ignore[misc]
         self._said: dict[str, float] = {}
         self._said_lock = threading.Lock()
 
+    def declare_parameters(
+        self, namespace: str, parameters: Sequence[Any], *arguments: Any, **options: Any
+    ) -> list[Parameter]:
+        """Declare (name, value, descriptor), as rclpy does, with None for an empty list.
+
+        In ROS an empty list of a parameter file has no type; rclpy hands it over as None, and then
+        ends with an exception that does not name the parameter.
+        """
+        typed = [(name, [] if value is None else value, *rest) for name, value, *rest in parameters]
+        return list(super().declare_parameters(namespace, typed, *arguments, **options))
+
     def filled(self, parameters: type[_Parameters]) -> _Parameters:
         """Return the instance of one of the parameter dataclasses."""
         value = self._filled[parameters]

@@ -96,9 +96,12 @@ def refuse_unknown(node: Node, *groups: Group) -> None:
     """Refuse values of unknown parameters; sections for all nodes may hold those of other nodes.
 
     Raises:
-        ConfigurationError: a parameter is unknown.
+        ConfigurationError: a parameter is unknown, or use_sim_time neither true nor false.
 
     """
+    sim_time = node.get_parameter('use_sim_time').value
+    if not isinstance(sim_time, bool):  # rclpy logs it, and goes on with the clock of the machine
+        raise ConfigurationError(f'parameter use_sim_time = {sim_time!r}: give true or false')
     known = named(groups)
     foreign = _only_in_wildcards(sys.argv, node.get_name())
     for name in node.get_parameters_by_prefix(''):

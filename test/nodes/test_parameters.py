@@ -127,6 +127,7 @@ def test_what_the_node_itself_refuses_does_not_change():
         ({'providers': 'x'}, ["providers = 'x'", 'a list']),
         ({'providers': [1, 2]}, ['providers', 'a list']),
         ({'sped': 1.0}, ['sped of sample is unknown', 'speed']),
+        ({'use_sim_time': 1}, ['use_sim_time = 1', 'true or false']),
         ({'group__cuont': 1}, ['group.cuont', 'did you mean group.count?']),
     ],
 )
@@ -214,6 +215,14 @@ def test_a_file_with_a_misspelt_parameter_is_refused(node_from, text, words):
     with pytest.raises(ConfigurationError) as caught:
         node_from(text)
     assert words in str(caught.value)
+
+
+def test_an_empty_list_of_a_file_is_an_empty_list(node_from):
+    node = node_from('sample:\n  ros__parameters: {providers: []}\n')
+    assert node.filled(Sample).providers == ()
+    node.destroy_node()
+    with pytest.raises(ConfigurationError, match=r'speed = \[\]: give a number'):
+        node_from('sample:\n  ros__parameters: {speed: []}\n')
 
 
 def test_parameters_of_ros_itself_are_known():

@@ -11,7 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'peace_ros'
-LINES_OF_WHAT_FLIES = 19_280
+LINES_OF_WHAT_FLIES = 19_300
 """Of core and nodes: 14,500, what learns a biased velocity and finds faulty axes, what names the
 cause that stops the vehicle (fence, second commander, failsafe after a silent line), what compares
 heights, what knows lens, mount, gimbal, shape and encodings of the camera, diagnostics of every
